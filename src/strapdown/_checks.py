@@ -27,7 +27,7 @@ def as_floats(name: str, value: ArrayLike) -> FloatArray:
     Masked elements become NaN. Text, objects and complex numbers are refused.
     """
     if isinstance(value, np.ma.MaskedArray):
-        value = value.astype(np.float64).filled(np.nan)
+        value = np.ma.filled(value.astype(np.float64), np.nan)
     try:
         array = np.asarray(value)
     except ValueError as error:  # rows of different length

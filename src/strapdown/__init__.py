@@ -12,18 +12,17 @@ __version__ = "0.1.0"
 if TYPE_CHECKING:
     from strapdown import (
         attitude,
-        calibration,
         conventions,
         earth,
-        estimator,
-        estimators,
+        errors,
         evaluation,
         io,
-        noise,
         report,
         rotation,
+        simulation,
         units,
     )
+    from strapdown import estimator as estimators
     from strapdown.io import read, write
     from strapdown.recording import Recording, from_arrays
     from strapdown.solution import Solution, Status
@@ -53,3 +52,32 @@ _NAMES = {
     "Solution": "strapdown.solution",
     "Status": "strapdown.solution",
 }
+
+
+def __getattr__(name: str) -> Any:
+    """Load a module or a name on its first use."""
+    if name == "estimators":
+        value: Any = import_module("strapdown.estimator")
+    elif name in _NAMES:
+        value = getattr(import_module(_NAMES[name]), name)
+    elif name in _MODULES:
+        value = _module(name)
+    else:
+        raise AttributeError(f"module 'strapdown' has no attribute {name!r}")
+    globals()[name] = value
+    return value
+
+
+def _module(name: str) -> Any:
+    """Import a part of the package; one that this version lacks is no attribute of it."""
+    full = f"strapdown.{name}"
+    try:
+        return import_module(full)
+    except ModuleNotFoundError as error:
+        if error.name != full:  # a dependency is missing, and its name must be seen
+            raise
+        raise AttributeError(f"strapdown {__version__} has no {name!r} yet") from None
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), "estimators", *_MODULES, *_NAMES})

@@ -198,21 +198,26 @@ def update_sparse(
 @kernel
 def _first_step(p: Mat, s: float, ph: Vec, gain: Vec) -> None:
     """``k = P h / s`` and ``P1 = P - k (P h)^T`` in place."""
+    d = 1.0 / s
     for i in range(p.shape[0]):
-        gain[i] = ph[i] / s
+        gain[i] = d * ph[i]
     for i in range(p.shape[0]):
-        for j in range(p.shape[0]):
-            p[i, j] -= gain[i] * ph[j]
+        for j in range(i + 1):
+            t = p[i, j] - gain[i] * ph[j]
+            p[i, j] = t
+            p[j, i] = t
 
 
 @kernel
 def _second_step(p: Mat, r: float, ph: Vec, gain: Vec) -> None:
-    """``P = P1 - (P1 h) k^T + r k k^T`` in place, from ``ph = P1 h`` as stored."""
+    """``P = P1 - (P1 h) k^T + r k k^T`` in place, from ``ph = P1 h`` as stored.
+
+    Symmetrised, the last two terms are ``g k^T + k g^T`` with ``g = (r k - P1 h) / 2``.
+    """
+    for i in range(p.shape[0]):
+        ph[i] = 0.5 * (r * gain[i] - ph[i])
     for i in range(p.shape[0]):
         for j in range(i + 1):
-            t = (
-                0.5 * ((p[i, j] - ph[i] * gain[j]) + (p[j, i] - ph[j] * gain[i]))
-                + r * gain[i] * gain[j]
-            )
+            t = p[i, j] + (ph[i] * gain[j] + gain[i] * ph[j])
             p[i, j] = t
             p[j, i] = t

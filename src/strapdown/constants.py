@@ -25,8 +25,8 @@ WGS84_E2: Final = WGS84_F * (2.0 - WGS84_F)  # first eccentricity squared
 WGS84_EP2: Final = WGS84_E2 / (1.0 - WGS84_E2)  # second eccentricity squared
 GAMMA_E: Final = 9.7803253359  # normal gravity at the equator [m/s^2]
 GAMMA_P: Final = 9.8321849378  # normal gravity at the poles [m/s^2]
-SOMIGLIANA_K: Final = WGS84_B * GAMMA_P / (WGS84_A * GAMMA_E) - 1.0  # constant of the formula
-SOMIGLIANA_M: Final = OMEGA_IE**2 * WGS84_A**2 * WGS84_B / WGS84_GM  # omega^2 a^2 b / GM
+SOMIGLIANA_K: Final = 0.00193185265241  # b gamma_p / (a gamma_e) - 1
+SOMIGLIANA_M: Final = 0.00344978650684  # omega^2 a^2 b / GM
 
 # --- Conventional values [2]_ ---------------------------------------------------------
 G0: Final = 9.80665  # standard acceleration of free fall [m/s^2]

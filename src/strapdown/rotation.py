@@ -69,7 +69,7 @@ def quat_normalize(q: ArrayLike) -> FloatArray:
     if (largest == 0.0).any():
         raise ValueError("`q` must not be zero, got a quaternion of norm 0.")
     array = array / largest  # the square of a huge or tiny element would overflow
-    return array / np.linalg.norm(array, axis=-1, keepdims=True)
+    return _renormalized(array)
 
 
 def rotate(q_nb: ArrayLike, v_b: ArrayLike) -> FloatArray:

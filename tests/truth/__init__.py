@@ -1,0 +1,1 @@
+"""Independent truths: closed forms and high-precision arithmetic, no code of the package."""

@@ -51,17 +51,36 @@ _NAMES = {
     "from_arrays": "strapdown.recording",
     "Solution": "strapdown.solution",
     "Status": "strapdown.solution",
+    "estimators": "strapdown.estimator",  # the module itself
 }
+__all__ = [
+    "Recording",
+    "Solution",
+    "Status",
+    "attitude",
+    "conventions",
+    "earth",
+    "errors",
+    "estimators",
+    "evaluation",
+    "from_arrays",
+    "io",
+    "read",
+    "report",
+    "rotation",
+    "simulation",
+    "units",
+    "write",
+]
 
 
 def __getattr__(name: str) -> Any:
     """Load a module or a name on its first use."""
-    if name == "estimators":
-        value: Any = import_module("strapdown.estimator")
-    elif name in _NAMES:
-        value = getattr(import_module(_NAMES[name]), name)
-    elif name in _MODULES:
+    if name in _MODULES:
         value = _module(name)
+    elif name in _NAMES:
+        module = import_module(_NAMES[name])
+        value = module if name == "estimators" else getattr(module, name)
     else:
         raise AttributeError(f"module 'strapdown' has no attribute {name!r}")
     globals()[name] = value
@@ -80,4 +99,4 @@ def _module(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), "estimators", *_MODULES, *_NAMES})
+    return sorted({*globals(), *__all__})

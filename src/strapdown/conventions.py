@@ -37,8 +37,8 @@ Symbol               Meaning
 ``f_b``              Specific force in b: what an accelerometer measures.
 ``v_n``, ``r_e``     Velocity over ground in NED; position in ECEF.
 ``lla``              Latitude, longitude [rad] and height above the ellipsoid [m].
-``phi_n``            Small attitude error resolved in n: true ``C_nb`` is ``exp(phi_n x)`` times the
-                     estimated one.
+``phi_n``            Small attitude error resolved in n: true ``C_nb`` is ``exp(phi_n x)`` times
+                     the estimated one.
 ``dtheta_b``         The same resolved in b: true ``C_nb`` is the estimated one times
                      ``exp(dtheta_b x)``.
 ``dx``               Error state: what must be *added to the estimate* to get the truth.

@@ -95,7 +95,8 @@ def rotate_inverse(
 ) -> tuple[float, float, float]:
     """``v_b = C(q_nb)^T v_n``."""
     # fmt: on
-    return rotate(w, -x, -y, -z, vx, vy, vz)
+    vx, vy, vz = rotate(w, -x, -y, -z, vx, vy, vz)
+    return vx, vy, vz
 
 
 @kernel
@@ -138,7 +139,8 @@ def from_dcm(
         w, x, y, z = c21 - c12, c13 + c31, c23 + c32, 1.0 - c11 - c22 + c33
     if w < 0.0:
         w, x, y, z = -w, -x, -y, -z
-    return normalize(w, x, y, z)
+    w, x, y, z = normalize(w, x, y, z)
+    return w, x, y, z
 
 
 # fmt: off
@@ -182,7 +184,8 @@ def from_two_vectors(
     dx, dy, dz = ax - bx, ay - by, az - bz
     w = sqrt(sx * sx + sy * sy + sz * sz)  # twice the half angle's cosine
     s = sqrt((dx * dx + dy * dy + dz * dz) / (kx * kx + ky * ky + kz * kz))  # twice its sine
-    return normalize(w, s * kx, s * ky, s * kz)
+    w, kx, ky, kz = normalize(w, s * kx, s * ky, s * kz)
+    return w, kx, ky, kz
 
 
 @kernel
@@ -224,8 +227,9 @@ def from_acc_mag(
     s = 1.0 / sqrt(e2)
     ex, ey, ez = s * ex, s * ey, s * ez
     # rows of C_nb: north = east x down, east, down
-    return from_dcm(
+    w, x, y, z = from_dcm(
         ey * dz - ez * dy, ez * dx - ex * dz, ex * dy - ey * dx,
         ex, ey, ez,
         dx, dy, dz,
     )  # fmt: skip
+    return w, x, y, z

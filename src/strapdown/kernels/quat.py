@@ -164,7 +164,7 @@ def from_two_vectors(
     bx, by, bz = s * bx, s * by, s * bz
     kx, ky, kz = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
     k2 = kx * kx + ky * ky + kz * kz
-    if k2 < 1e-30:  # nothing but round-off is left of the cross product
+    if k2 < 1e-32:  # nothing but round-off is left of the cross product
         if ax * bx + ay * by + az * bz > 0.0:
             return 1.0, 0.5 * kx, 0.5 * ky, 0.5 * kz
         # a crossed with the axis it is least along

@@ -56,7 +56,7 @@ def _require_finite(name: str, array: FloatArray, item_ndim: int, *, allow_nan: 
     shape = array.shape[: array.ndim - item_ndim]
     items = bad.reshape(*shape, -1).any(axis=-1) if item_ndim else bad
     first = int(np.flatnonzero(items)[0])
-    got = array.reshape(-1, *array.shape[len(shape) :])[first]
+    got = " ".join(str(array.reshape(-1, *array.shape[len(shape) :])[first]).split())
     must = "finite or NaN" if allow_nan else "finite"
     raise ValueError(f"`{name}` must be {must}, got {got}{_place(shape, first)}.")
 
@@ -234,7 +234,7 @@ def nearest(value: Any, choices: Iterable[str]) -> str:
     """Return the tail of a message that offers the nearest choice, or nothing."""
     by_lower = {choice.lower(): choice for choice in choices}
     found = difflib.get_close_matches(str(value).lower(), by_lower, n=1, cutoff=0.6)
-    return f"; did you mean {by_lower[found[0]]!r}" if found else ""
+    return f"; the nearest name is {by_lower[found[0]]!r}" if found else ""
 
 
 def _as_float(name: str, value: Any) -> float:

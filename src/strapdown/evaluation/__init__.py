@@ -1,0 +1,17 @@
+"""How far an estimate is from a reference."""
+
+from strapdown.evaluation.attitude import AttitudeErrors, attitude_errors
+from strapdown.evaluation.navigation import NavigationErrors, navigation_errors
+from strapdown.evaluation.statistics import ErrorStatistics, robust_circular_mean
+from strapdown.evaluation.sync import Match, match
+
+__all__ = [
+    "AttitudeErrors",
+    "ErrorStatistics",
+    "Match",
+    "NavigationErrors",
+    "attitude_errors",
+    "match",
+    "navigation_errors",
+    "robust_circular_mean",
+]

@@ -1,0 +1,10 @@
+"""Reports: one HTML file each, that opens anywhere and needs no network.
+
+`write` makes the report of a run. Other reports are composed from the same parts: `page` (the
+file and its blocks), `figures` (what to draw), `decimate` (fewer points for display), `scene`
+(the 3D view), `streams`, `attitude`, `navigation` and `health` (sections).
+"""
+
+from strapdown.report.run import compose, write
+
+__all__ = ["compose", "write"]

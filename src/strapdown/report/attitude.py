@@ -1,0 +1,194 @@
+"""The attitude of a solution and its errors, as sections of a report."""
+
+import numpy as np
+
+from strapdown._types import BoolArray, FloatArray
+from strapdown.evaluation import AttitudeErrors, match
+from strapdown.recording import Reference
+from strapdown.report.figures import (
+    AXIS_COLORS,
+    ESTIMATE,
+    REFERENCE,
+    Band,
+    Panel,
+    Series,
+    sigma_band,
+    time_figure,
+)
+from strapdown.report.page import Block, Section, plot, table
+from strapdown.report.scene import frame_rows, scene
+from strapdown.rotation import quat_conj, quat_mul, rpy_from_quat
+from strapdown.solution import Solution, Status
+from strapdown.units import DEG
+
+TURN_DEG = 360.0
+
+
+def aligned(sol: Solution) -> BoolArray:
+    """Return where the solution has an attitude."""
+    return np.asarray((sol.status & Status.ALIGNING) == 0)
+
+
+def turned_reference(
+    reference: Reference | None, errors: AttitudeErrors | None
+) -> tuple[FloatArray, FloatArray] | None:
+    """Return times and attitude of the reference as it is drawn beside the estimate.
+
+    An arbitrary heading differs by a constant; the reference is turned by it.
+    """
+    if reference is None or reference.attitude is None:
+        return None
+    part = reference.attitude
+    use = ~part.nan_rows()
+    if not use.any():
+        return None
+    q_nb = part.q_nb[use]
+    if errors is not None and errors.heading_constant:
+        half = 0.5 * errors.heading_constant
+        turn = np.array([np.cos(half), 0.0, 0.0, np.sin(half)])
+        q_nb = quat_mul(np.broadcast_to(turn, q_nb.shape), q_nb)
+    return part.t[use], q_nb
+
+
+def scene_section(
+    sol: Solution, reference: Reference | None, errors: AttitudeErrors | None
+) -> Section:
+    """Return the 3D view."""
+    rows = frame_rows(sol.t)
+    if not len(rows):
+        return Section(title="3D view", blocks=[])
+    ghost = None
+    turned = turned_reference(reference, errors)
+    if turned is not None:
+        found = match(turned[0], sol.t[rows])
+        ghost = np.full((len(rows), 4), np.nan)
+        ghost[found.rows] = found.quats(turned[1])
+    view = scene(sol.t[rows], sol.q_nb[rows], aligned(sol)[rows], ghost)
+    return Section(title="3D view", blocks=[view])
+
+
+def attitude_section(
+    sol: Solution, reference: Reference | None, errors: AttitudeErrors | None
+) -> Section:
+    """Return roll, pitch and yaw, and the standard deviations where stated."""
+    turned = turned_reference(reference, errors)
+    q_nb, whose = sol.q_nb, "box, axes as recorded"
+    if sol.q_vb is not None:
+        q_nb, whose = quat_mul(q_nb, quat_conj(sol.q_vb)), "vehicle, through the estimated mount"
+    rpy = np.where(aligned(sol)[:, np.newaxis], rpy_from_quat(q_nb), np.nan) / DEG
+    rpy_ref = None
+    if turned is not None:
+        t_ref, q_ref = turned
+        if sol.q_vb is not None:
+            t_ref, q_ref = _through_mount(reference, t_ref, q_ref)
+        rpy_ref = (t_ref, rpy_from_quat(q_ref) / DEG) if len(t_ref) else None
+    panels = []
+    for column, name in enumerate(("roll", "pitch", "yaw")):
+        period = None if name == "pitch" else TURN_DEG
+        items = []
+        if rpy_ref is not None:
+            items.append(
+                Series(x=rpy_ref[0], y=rpy_ref[1][:, column], name="reference", color=REFERENCE,
+                       width=3.0, period=period)
+            )  # fmt: skip
+        items.append(Series(x=sol.t, y=rpy[:, column], name="estimate", period=period))
+        panels.append(Panel(y_label=f"{name} [°]", items=items))
+    if sol.std_attitude_n is not None:
+        std = np.where(aligned(sol)[:, np.newaxis], sol.std_attitude_n, np.nan) / DEG
+        items = [
+            Series(x=sol.t, y=std[:, i], name=f"sigma about {name}", color=AXIS_COLORS[i])
+            for i, name in enumerate(("north", "east", "down"))
+        ]
+        panels.append(Panel(y_label="std. dev. [°]", items=items, log_y=True, height=120))
+    note = f"Attitude of the {whose}, relative to north, east, down; {_heading(sol)}"
+    if errors is not None and errors.heading_removed and rpy_ref is not None:
+        note += f" The reference is turned by {errors.heading_constant / DEG:.2f}° for the figure."
+    return Section(title="Attitude", intro=note, blocks=[plot(time_figure(panels))])
+
+
+def _heading(sol: Solution) -> str:
+    """Return what heading is measured from, as a half-sentence."""
+    return {
+        "true": "heading from true north.",
+        "magnetic": "heading from magnetic north.",
+        "arbitrary": "heading from an arbitrary direction.",
+    }[sol.heading_reference]
+
+
+def _through_mount(
+    reference: Reference | None, t: FloatArray, q_nb: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return the reference's attitude of the vehicle where its mount is known."""
+    if reference is None or reference.mount is None:
+        return t[:0], q_nb[:0]
+    mount = reference.mount
+    use = ~mount.nan_rows() if mount.valid is None else mount.valid & ~mount.nan_rows()
+    found = match(mount.t[use], t, max_gap=5.0)
+    return t[found.rows], quat_mul(q_nb[found.rows], quat_conj(found.quats(mount.q_vb[use])))
+
+
+# --- errors -----------------------------------------------------------------------------
+
+
+def error_table(errors: AttitudeErrors) -> Block:
+    """Return the summary of the attitude errors."""
+    rows = [
+        (name, s.rmse / DEG, s.median / DEG, s.p95 / DEG, s.maximum / DEG)
+        for name, s in errors.statistics().items()
+    ]
+    return table(
+        ("attitude error", "RMSE [°]", "median [°]", "95 % [°]", "maximum [°]"),
+        rows,
+        caption="Attitude errors against the reference",
+    )
+
+
+def error_notes(errors: AttitudeErrors) -> list[str]:
+    """Return what must be known to read the attitude errors, one sentence each."""
+    notes = [f"{len(errors):,} samples of the reference count.".replace(",", "\u202f")]
+    if errors.left_out:
+        listed = ", ".join(f"{count:,} {why}" for why, count in errors.left_out.items())
+        notes.append(f"Left out: {listed}.".replace(",0", ",0"))
+    notes.append(errors.heading_note)
+    if errors.axes == "vehicle":
+        notes.append("Roll, pitch and yaw are those of the vehicle, by the reference's mount.")
+    within, ratio = errors.inclination_within_3sigma, errors.inclination_sigma_ratio
+    if within is not None and ratio is not None:
+        notes.append(
+            f"{100.0 * within:.1f} % of the inclination errors lie within the stated 3 sigma; "
+            f"the stated sigma is {ratio:.2f} times what 97 % would have needed."
+        )
+    return notes
+
+
+def error_section(errors: AttitudeErrors) -> Section:
+    """Return the attitude errors over time, with 3 sigma where it is stated."""
+
+    def panel(name: str, values: FloatArray, sigma: FloatArray | None = None) -> Panel:
+        items: list[Series | Band] = []
+        if sigma is not None:
+            items.append(sigma_band(errors.t, sigma / DEG))
+        items.append(Series(x=errors.t, y=values / DEG, name="error", color=ESTIMATE))
+        return Panel(y_label=f"{name} [°]", items=items, height=125)
+
+    split = [panel("total", errors.total), panel("heading", errors.heading)]
+    split.append(panel("inclination", errors.inclination))
+    blocks = [plot(time_figure(split))]
+    std = errors.std_n
+    if std is not None:
+        tilt = [
+            panel("about north", errors.tilt_n[:, 0], std[:, 0]),
+            panel("about east", errors.tilt_n[:, 1], std[:, 1]),
+            panel("about down", errors.heading, std[:, 2]),
+        ]
+        note = "The same errors about the axes of n, within what the estimator states."
+        blocks.append(plot(time_figure(tilt), note))
+    names = ("roll", "pitch", "yaw")
+    rpy = [panel(f"{name} error", errors.rpy[:, i]) for i, name in enumerate(names)]
+    blocks.append(plot(time_figure(rpy)))
+    return Section(
+        title="Attitude errors",
+        intro="Estimate less reference, where the reference counts. Heading: about the "
+        "vertical, positive clockwise. Inclination: between the two verticals.",
+        blocks=blocks,
+    )

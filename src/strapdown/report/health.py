@@ -1,0 +1,179 @@
+"""What an estimator says of itself: biases, status, innovations, as sections of a report."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from strapdown.report import decimate
+from strapdown.report.figures import (
+    ALARM,
+    AXIS_COLORS,
+    MUTED,
+    Band,
+    Panel,
+    Series,
+    sigma_band,
+    time_figure,
+    timeline,
+)
+from strapdown.report.page import Block, Section, plot, table, text
+from strapdown.solution import Diagnostics, Outcome, Solution, Status
+from strapdown.units import DPS
+
+
+class Flag(NamedTuple):
+    """How a status flag is shown: colour, and what it means."""
+
+    color: str
+    meaning: str
+
+
+FLAGS: dict[Status, Flag] = {
+    Status.ALIGNING: Flag("#7d8794", "no attitude yet"),
+    Status.GYR_INVALID: Flag(ALARM, "rate missing or absurd: sample skipped"),
+    Status.ACC_INVALID: Flag(ALARM, "specific force missing or absurd: not used"),
+    Status.MAG_INVALID: Flag(ALARM, "magnetic field missing or absurd: not used"),
+    Status.ACC_REJECTED: Flag("#e08a1e", "specific force does not look like gravity: not used"),
+    Status.MAG_REJECTED: Flag("#e08a1e", "magnetic field fails its gate: not used"),
+    Status.AIDING_REJECTED: Flag("#e08a1e", "another aiding measurement fails its gate"),
+    Status.GAP: Flag(ALARM, "longer without a sample than the estimator bridges"),
+    Status.REST: Flag("#3b9b6d", "found to be at rest"),
+    Status.SATURATED: Flag(ALARM, "a sensor is at the end of its range"),
+    Status.MAG_DISTURBED: Flag("#b4549c", "magnetic field found to be disturbed"),
+    Status.OUTAGE: Flag("#b4549c", "aiding that bounds the position is missing"),
+}
+
+
+# --- biases -----------------------------------------------------------------------------
+
+
+def bias_section(sol: Solution) -> Section:
+    """Return the sensor biases with 3 sigma where it is stated."""
+    blocks = []
+    for name, values, std, unit, symbol in (
+        ("gyroscope bias", sol.gyr_bias, sol.std_gyr_bias, DPS, "°/s"),
+        ("accelerometer bias", sol.acc_bias, sol.std_acc_bias, 1.0, "m/s²"),
+    ):
+        if values is None:
+            continue
+        panels = []
+        for i, axis in enumerate("xyz"):
+            items: list[Series | Band] = []
+            if std is not None:
+                items.append(sigma_band(sol.t, std[:, i] / unit, values[:, i] / unit))
+            items.append(Series(x=sol.t, y=values[:, i] / unit, name=axis, color=AXIS_COLORS[i]))
+            panels.append(Panel(y_label=f"{axis} [{symbol}]", items=items, height=100))
+        blocks.append(plot(time_figure(panels), f"Estimated {name}."))
+    return Section(title="Biases", blocks=blocks)
+
+
+# --- status -----------------------------------------------------------------------------
+
+
+def status_section(sol: Solution) -> Section:
+    """Return when each flag is set."""
+    shown = [flag for flag in Status if (sol.status & flag).any()]
+    if not shown:
+        return Section(title="Status", blocks=[text("No flag is set at any sample.")])
+    rows = [
+        (flag.name or "", FLAGS[flag].color, (sol.status & flag).astype(np.bool_))
+        for flag in shown
+    ]
+    return Section(title="Status", blocks=[plot(timeline(sol.t, rows)), status_table(sol)])
+
+
+def status_table(sol: Solution) -> Block:
+    """Return how often each flag is set, and what it means."""
+    rows = []
+    for flag in Status:
+        mask = (sol.status & flag).astype(np.bool_)
+        first, last = decimate.runs(mask)
+        if len(first):
+            rows.append(
+                (
+                    flag.name or "",
+                    int(np.count_nonzero(mask)),
+                    100.0 * float(mask.mean()),
+                    len(first),
+                    float(sol.t[first[0]]),
+                    float((sol.t[last] - sol.t[first]).max()),
+                    FLAGS[flag].meaning,
+                )
+            )
+    heads = ("flag", "samples", "share [%]", "times", "first at [s]", "longest [s]", "meaning")
+    return table(heads, rows)
+
+
+def skipped_blocks(sol: Solution) -> list[Block]:
+    """Return which samples the estimator skipped, by reason."""
+    reasons = (Status.GYR_INVALID, Status.ACC_INVALID, Status.MAG_INVALID, Status.GAP)
+    rows = []
+    for flag in reasons:
+        hit = np.flatnonzero(sol.status & flag)
+        if len(hit):
+            first, last = float(sol.t[hit[0]]), float(sol.t[hit[-1]])
+            rows.append((flag.name or "", len(hit), first, last, FLAGS[flag].meaning))
+    if not rows:
+        return [text("No sample was skipped.")]
+    heads = ("reason", "samples", "first at [s]", "last at [s]", "meaning")
+    return [table(heads, rows, caption="Skipped samples")]
+
+
+# --- innovations ------------------------------------------------------------------------
+
+
+def innovation_section(sol: Solution) -> Section:
+    """Return measured less predicted of each aiding sensor, with 3 sigma and rejections."""
+    blocks: list[Block] = []
+    if sol.diagnostics:
+        blocks.append(_innovation_table(sol))
+    for name, d in sol.diagnostics.items():
+        if len(d.t):
+            blocks.append(plot(time_figure(_innovation_panels(d)), f"Innovations of {name}."))
+    return Section(
+        title="Innovations",
+        intro="Measured less predicted, one row for each measurement that was looked at.",
+        blocks=blocks,
+    )
+
+
+def _innovation_table(sol: Solution) -> Block:
+    rows = []
+    for name, d in sol.diagnostics.items():
+        counts = np.bincount(d.outcome, minlength=len(Outcome))
+        accepted = d.outcome == Outcome.ACCEPTED
+        with np.errstate(invalid="ignore", divide="ignore"):
+            ratio = np.square(d.innovation[accepted] / d.sigma[accepted])
+        ratio = ratio[np.isfinite(ratio)]
+        rows.append(
+            (
+                name,
+                len(d.t),
+                int(counts[Outcome.ACCEPTED]),
+                int(counts[Outcome.REJECTED_GATE]),
+                int(counts[Outcome.REJECTED_DISTURBED]),
+                int(counts[Outcome.REJECTED_INVALID]),
+                float(ratio.mean()) if len(ratio) else None,
+            )
+        )
+    heads = ("measurement", "rows", "accepted", "rejected by gate", "rejected as disturbed",
+             "rejected as invalid", "mean of (innovation / sigma)²")  # fmt: skip
+    return table(heads, rows)
+
+
+def _innovation_panels(d: Diagnostics) -> list[Panel]:
+    accepted = d.outcome == Outcome.ACCEPTED
+    refused = d.outcome > Outcome.ACCEPTED
+    panels = []
+    for i, label in enumerate(d.labels):
+        items: list[Series | Band] = []
+        if np.isfinite(d.sigma[:, i]).any():
+            items.append(sigma_band(d.t, d.sigma[:, i]))
+        x, y = d.t[accepted], d.innovation[accepted, i]
+        items.append(Series(x=x, y=y, name="accepted", color=MUTED, width=0.9))
+        if refused.any():
+            x, y = d.t[refused], d.innovation[refused, i]
+            items.append(Series(x=x, y=y, name="rejected", color=ALARM, kind="points", width=3.5))
+        unit = f" [{d.unit}]" if d.unit else ""
+        panels.append(Panel(y_label=f"{label}{unit}", items=items, height=105))
+    return panels

@@ -1,0 +1,199 @@
+"""Track, velocity, mount and their errors, as sections of a report."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from strapdown._types import FloatArray
+from strapdown.earth import ned_from_lla
+from strapdown.evaluation import NavigationErrors
+from strapdown.recording import Recording
+from strapdown.report import decimate
+from strapdown.report.figures import (
+    AXIS_COLORS,
+    ESTIMATE,
+    REFERENCE,
+    Band,
+    Panel,
+    Series,
+    grid_figure,
+    sigma_band,
+    time_figure,
+)
+from strapdown.report.page import Block, Section, plot, table
+from strapdown.rotation import rpy_from_quat
+from strapdown.solution import Solution
+from strapdown.units import DEG
+
+AXES = ("north", "east", "down")
+FIX = "#e08a1e"
+
+
+class _Local(NamedTuple):
+    """Positions north, east, down [m] of one origin, at their times; NaN rows left out."""
+
+    t: FloatArray
+    r_n: FloatArray
+
+
+def _local(t: FloatArray, lla: FloatArray, origin: FloatArray) -> _Local:
+    there = ~np.isnan(lla).any(axis=1)
+    r_n = ned_from_lla(lla[there], origin)
+    r_n[:, 2] = origin[2] - lla[there, 2]  # heights, free of the Earth's curvature
+    return _Local(t[there], r_n)
+
+
+def _origin(sol: Solution) -> FloatArray | None:
+    """Return the first position of the solution."""
+    if sol.lla is None:
+        return None
+    there = np.flatnonzero(~np.isnan(sol.lla).any(axis=1))
+    return sol.lla[there[0]] if len(there) else None
+
+
+def track_section(sol: Solution, rec: Recording) -> Section:
+    """Return the track in local metres, the height and the velocity."""
+    origin = _origin(sol)
+    if origin is None or sol.lla is None:
+        return Section(title="Track", blocks=[])
+    track = _local(sol.t, sol.lla, origin)
+    ref = rec.reference.position if rec.reference is not None else None
+    reference = _local(ref.t, ref.lla, origin) if ref is not None else None
+    fixes = _local(rec.gnss.t, rec.gnss.lla, origin) if rec.gnss is not None else None
+
+    path: list[Series | Band] = []
+    if reference is not None:
+        path.append(_path(reference, "reference", REFERENCE, 3.5))
+    if fixes is not None:
+        x, y = fixes.r_n[:, 1], fixes.r_n[:, 0]
+        path.append(Series(x=x, y=y, name="GNSS fixes", color=FIX, kind="points", width=4.0))
+    path.append(_path(track, "estimate", ESTIMATE, 1.6))
+    for row, name, color in ((0, "start", "#2c8a4b"), (-1, "end", "#1d232b")):
+        x, y = track.r_n[[row], 1], track.r_n[[row], 0]
+        path.append(Series(x=x, y=y, name=name, color=color, kind="points", width=10.0))
+    chart = Panel(x_label="east [m]", y_label="north [m]", items=path, height=520, equal=True)
+    where = f"{origin[0] / DEG:.6f}°, {origin[1] / DEG:.6f}°, {origin[2]:.1f} m"
+    return Section(
+        title="Track",
+        intro=f"Metres north and east of the first position, {where}.",
+        blocks=[
+            plot(grid_figure([chart])),
+            plot(time_figure(_motion(sol, rec, track, reference, fixes))),
+        ],
+    )
+
+
+def _path(local: _Local, name: str, color: str, width: float) -> Series:
+    """Return a track, thinned out with its extremes kept."""
+    east, north = decimate.path(local.t, local.r_n[:, 1], local.r_n[:, 0])
+    return Series(x=east, y=north, name=name, color=color, kind="path", width=width)
+
+
+def _motion(
+    sol: Solution,
+    rec: Recording,
+    track: _Local,
+    reference: _Local | None,
+    fixes: _Local | None,
+) -> list[Panel]:
+    """Return height and velocity over time."""
+    height: list[Series | Band] = []
+    if reference is not None:
+        height.append(Series(x=reference.t, y=-reference.r_n[:, 2], name="reference",
+                             color=REFERENCE, width=3.0))  # fmt: skip
+    if fixes is not None:
+        height.append(Series(x=fixes.t, y=-fixes.r_n[:, 2], name="GNSS fixes", color=FIX,
+                             kind="points", width=3.0))  # fmt: skip
+    height.append(Series(x=track.t, y=-track.r_n[:, 2], name="estimate"))
+    panels = [Panel(y_label="height gain [m]", items=height, height=120)]
+    if sol.v_n is None:
+        return panels
+    ref = rec.reference.position if rec.reference is not None else None
+    for i, axis in enumerate(AXES):
+        items: list[Series | Band] = []
+        if ref is not None and ref.v_n is not None:
+            items.append(Series(x=ref.t, y=ref.v_n[:, i], name="reference", color=REFERENCE,
+                                width=3.0))  # fmt: skip
+        if rec.gnss is not None and rec.gnss.v_n is not None:
+            items.append(Series(x=rec.gnss.t, y=rec.gnss.v_n[:, i], name="GNSS fixes", color=FIX,
+                                kind="points", width=3.0))  # fmt: skip
+        items.append(Series(x=sol.t, y=sol.v_n[:, i], name="estimate"))
+        panels.append(Panel(y_label=f"v {axis} [m/s]", items=items, height=120))
+    return panels
+
+
+def sigma_section(sol: Solution) -> Section:
+    """Return the standard deviations of position and velocity that the estimator states."""
+    panels = []
+    for label, std in (
+        ("position [m]", sol.std_position_n),
+        ("velocity [m/s]", sol.std_velocity_n),
+    ):
+        if std is not None:
+            items = [
+                Series(x=sol.t, y=std[:, i], name=AXES[i], color=AXIS_COLORS[i]) for i in range(3)
+            ]
+            panels.append(Panel(y_label=label, items=items, log_y=True))
+    return Section(
+        title="Standard deviations",
+        intro="Of position and velocity, as the estimator states them.",
+        blocks=[plot(time_figure(panels))] if panels else [],
+    )
+
+
+def mount_section(sol: Solution) -> Section:
+    """Return the estimated mount, roll, pitch and yaw of the box in the vehicle."""
+    if sol.q_vb is None:
+        return Section(title="Mount", blocks=[])
+    rpy = rpy_from_quat(sol.q_vb) / DEG
+    items = [
+        Series(x=sol.t, y=rpy[:, i], name=name, color=AXIS_COLORS[i], period=360.0)
+        for i, name in enumerate(("roll", "pitch", "yaw"))
+    ]
+    last = table(
+        ("axis", "at the end [°]"), [(name, float(rpy[-1, i])) for i, name in
+                                     enumerate(("roll", "pitch", "yaw"))]
+    )  # fmt: skip
+    return Section(
+        title="Mount",
+        intro="Attitude of the box in the vehicle's axes, forward, right, down.",
+        blocks=[plot(time_figure([Panel(y_label="angle [°]", items=items)])), last],
+    )
+
+
+def error_table(errors: NavigationErrors) -> Block:
+    """Return the summary of the position and velocity errors."""
+    units = {"horizontal": "m", "vertical": "m", "velocity": "m/s"}
+    rows = [
+        (f"{name} [{units[name]}]", s.rmse, s.median, s.p95, s.maximum)
+        for name, s in errors.statistics().items()
+    ]
+    return table(
+        ("error", "RMSE", "median", "95 %", "maximum"),
+        rows,
+        caption="Position and velocity errors against the reference",
+    )
+
+
+def error_section(errors: NavigationErrors) -> Section:
+    """Return position and velocity errors over time, with 3 sigma where it is stated."""
+    blocks = []
+    for values, std, what, unit in (
+        (errors.position_n, errors.std_position_n, "position", "m"),
+        (errors.velocity_n, errors.std_velocity_n, "velocity", "m/s"),
+    ):
+        if values is None:
+            continue
+        panels = []
+        for i, axis in enumerate(AXES):
+            items: list[Series | Band] = []
+            if std is not None:
+                items.append(sigma_band(errors.t, std[:, i]))
+            items.append(Series(x=errors.t, y=values[:, i], name="error"))
+            panels.append(Panel(y_label=f"{axis} [{unit}]", items=items, height=120))
+        blocks.append(plot(time_figure(panels), f"Errors of the {what}."))
+    return Section(
+        title="Position errors",
+        intro="Estimate less reference, where the reference counts.",
+        blocks=blocks,
+    )

@@ -1,0 +1,176 @@
+"""The report of a run: what an estimator made of a recording."""
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from strapdown.errors import DataGap
+from strapdown.evaluation import (
+    AttitudeErrors,
+    NavigationErrors,
+    attitude_errors,
+    navigation_errors,
+)
+from strapdown.recording import Recording
+from strapdown.report import attitude, health, navigation, page, streams
+from strapdown.report.page import Block, Page, Section
+from strapdown.solution import Solution
+from strapdown.units import DEG
+
+Errors = AttitudeErrors | NavigationErrors
+
+
+def write(
+    sol: Solution,
+    rec: Recording,
+    path: str | os.PathLike[str],
+    errors: Errors | None = None,
+    title: str | None = None,
+) -> Path:
+    """Write the report of a run: one HTML file that opens anywhere, without a network.
+
+    Lines are thinned out for display with their extremes kept; every number is computed
+    from all samples.
+
+    Parameters
+    ----------
+    sol : Solution
+        What was estimated.
+    rec : Recording
+        From what.
+    path : str or path
+        The HTML file; one that is there is replaced, never half written.
+    errors : AttitudeErrors or NavigationErrors, optional
+        Errors against a reference. By default they are computed if the recording has a
+        reference that the solution overlaps.
+    title : str, optional
+        Heading of the page; by default the name of the recording and of the filter.
+
+    Returns
+    -------
+    Path
+        The file.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be written.
+    """
+    return page.write(compose(sol, rec, errors, title), path)
+
+
+def compose(
+    sol: Solution, rec: Recording, errors: Errors | None = None, title: str | None = None
+) -> Page:
+    """Return the page that `write` writes."""
+    if errors is None:
+        errors = _errors(sol, rec)
+    of_position = errors if isinstance(errors, NavigationErrors) else None
+    of_attitude = errors.attitude if isinstance(errors, NavigationErrors) else errors
+    name = str(rec.meta.get("name") or "recording")
+    sections = [
+        _summary(sol, rec, of_attitude, of_position),
+        attitude.scene_section(sol, rec.reference, of_attitude),
+        attitude.attitude_section(sol, rec.reference, of_attitude),
+    ]
+    if of_attitude is not None:
+        sections.append(attitude.error_section(of_attitude))
+    if sol.is_navigation:
+        sections.append(navigation.track_section(sol, rec))
+        if of_position is not None:
+            sections.append(navigation.error_section(of_position))
+        sections += [navigation.sigma_section(sol), navigation.mount_section(sol)]
+    sections += [
+        health.bias_section(sol),
+        health.innovation_section(sol),
+        health.status_section(sol),
+        streams.sensor_section(rec),
+        streams.timing_section(rec, health.skipped_blocks(sol)),
+    ]
+    return Page(
+        title=title or f"{name}: {sol.filter}",
+        subtitle=_subtitle(sol, rec),
+        sections=sections,
+    )
+
+
+def _errors(sol: Solution, rec: Recording) -> Errors | None:
+    """Return the errors against the recording's reference, if there is one that fits."""
+    reference = rec.reference
+    if reference is None:
+        return None
+    try:
+        if sol.is_navigation and reference.position is not None:
+            return navigation_errors(sol, reference)
+        return attitude_errors(sol, reference) if reference.attitude is not None else None
+    except DataGap:
+        return None
+
+
+def _subtitle(sol: Solution, rec: Recording) -> str:
+    parts = [f"Filter {sol.filter}, {'causal' if sol.causal else 'smoothed offline'}"]
+    parts += [str(rec.meta[key]) for key in ("source", "epoch_utc") if rec.meta.get(key)]
+    return " · ".join(parts)
+
+
+def _summary(
+    sol: Solution,
+    rec: Recording,
+    of_attitude: AttitudeErrors | None,
+    of_position: NavigationErrors | None,
+) -> Section:
+    """Return what one wants to know first."""
+    n = len(sol.t)
+    duration = float(sol.t[-1] - sol.t[0]) if n else 0.0
+    ready = float(attitude.aligned(sol).mean()) if n else 0.0
+    cards = [
+        ("duration", page.number(duration), "s"),
+        ("samples", page.number(n), ""),
+        (
+            "heading",
+            sol.heading_reference,
+            "north" if sol.heading_reference != "arbitrary" else "",
+        ),
+        ("with attitude", f"{100.0 * ready:.1f}", "%"),
+    ]
+    if of_position is not None:
+        s = of_position.statistics()
+        cards.append(("horizontal RMSE", page.number(s["horizontal"].rmse, 3), "m"))
+    if of_attitude is not None:
+        stats = of_attitude.statistics()
+        cards += [
+            (f"{name} RMSE", f"{stats[name].rmse / DEG:.2f}", "°")
+            for name in ("total", "heading", "inclination")
+        ]
+    tables: list[Block] = []
+    if of_position is not None:
+        tables.append(navigation.error_table(of_position))
+    if of_attitude is not None:
+        tables.append(attitude.error_table(of_attitude))
+    parameters = _parameters(sol.meta)
+    if parameters:
+        tables.append(page.table(("parameter", "value"), parameters, caption="Estimator"))
+    blocks = [page.cards(cards)]
+    if tables:
+        blocks.append(page.beside(*tables))
+    if of_attitude is not None:
+        blocks.append(page.text(*attitude.error_notes(of_attitude)))
+    blocks.append(streams.stream_table(rec))
+    return Section(title="Summary", blocks=blocks)
+
+
+def _parameters(meta: Mapping[str, object]) -> list[tuple[str, object]]:
+    """Return the estimator's parameters and other facts, nested ones with dotted names."""
+    rows: list[tuple[str, object]] = []
+    for key, value in meta.items():
+        if isinstance(value, Mapping):
+            rows += [(f"{key}.{name}", inner) for name, inner in _parameters(value)]
+        elif isinstance(value, (list, tuple, np.ndarray)):
+            rows.append(
+                (key, ", ".join(f"{v:g}" if isinstance(v, float) else str(v) for v in value))
+            )
+        else:
+            rows.append((key, value))
+    return rows

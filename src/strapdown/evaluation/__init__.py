@@ -1,6 +1,6 @@
 """How far an estimate is from a reference."""
 
-from strapdown.evaluation.attitude import AttitudeErrors, attitude_errors
+from strapdown.evaluation.attitude import AttitudeErrors, attitude_errors, mount_at
 from strapdown.evaluation.navigation import NavigationErrors, navigation_errors
 from strapdown.evaluation.statistics import ErrorStatistics, robust_circular_mean
 from strapdown.evaluation.sync import Match, match
@@ -12,6 +12,7 @@ __all__ = [
     "NavigationErrors",
     "attitude_errors",
     "match",
+    "mount_at",
     "navigation_errors",
     "robust_circular_mean",
 ]

@@ -10,12 +10,11 @@ from strapdown.errors import DataGap, MissingStream
 from strapdown.evaluation.statistics import ErrorStatistics, robust_circular_mean
 from strapdown.evaluation.sync import MAX_GAP_S, match
 from strapdown.recording import AttitudeReference, MountReference, Reference
-from strapdown.rotation import quat_conj, quat_mul, rpy_from_quat, wrap_pi
+from strapdown.rotation import interpolate, quat_conj, quat_mul, rpy_from_quat, wrap_pi
 from strapdown.solution import Solution, Status
 from strapdown.units import DEG
 
 COVERAGE = 0.97  # share of samples that an honest 3 sigma bound should hold at least
-MOUNT_GAP_S = 5.0  # a mount hardly changes: its samples may lie further apart
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -225,6 +224,18 @@ def attitude_errors(
     )
 
 
+def mount_at(mount: MountReference, t: FloatArray) -> FloatArray | None:
+    """Return the reference's mount, ``q_vb`` of shape (m, 4), at times `t`, or None.
+
+    A mount hardly changes: between its valid samples it is interpolated however far they lie
+    apart, before the first and after the last it is held.
+    """
+    known = mount.rows(_valid(mount))
+    if not len(known):
+        return None
+    return interpolate(np.clip(t, known.t[0], known.t[-1]), known.t, known.q_vb)
+
+
 def _valid(stream: AttitudeReference | MountReference) -> BoolArray:
     """Return which samples of a reference may be used."""
     usable = ~stream.nan_rows()
@@ -258,14 +269,11 @@ def _rpy_difference(
     q_est: FloatArray, q_ref: FloatArray, t: FloatArray, mount: MountReference | None
 ) -> tuple[FloatArray, str]:
     """Return estimated less true roll, pitch, yaw, and whether of the box or the vehicle."""
-    if mount is not None:
-        usable = mount.rows(_valid(mount))
-        found = match(usable.t, t, MOUNT_GAP_S)
-        if len(found.rows) == len(t):
-            q_bv = quat_conj(found.quats(usable.q_vb))
-            q_est, q_ref = quat_mul(q_est, q_bv), quat_mul(q_ref, q_bv)
-            return rpy_from_quat(q_est) - rpy_from_quat(q_ref), "vehicle"
-    return rpy_from_quat(q_est) - rpy_from_quat(q_ref), "body"
+    q_vb = None if mount is None else mount_at(mount, t)
+    if q_vb is None:
+        return rpy_from_quat(q_est) - rpy_from_quat(q_ref), "body"
+    q_bv = quat_conj(q_vb)
+    return rpy_from_quat(quat_mul(q_est, q_bv)) - rpy_from_quat(quat_mul(q_ref, q_bv)), "vehicle"
 
 
 def _note(estimate: str, reference: str, removed: bool, constant: float) -> str:

@@ -3,7 +3,7 @@
 import numpy as np
 
 from strapdown._types import BoolArray, FloatArray
-from strapdown.evaluation import AttitudeErrors, match
+from strapdown.evaluation import AttitudeErrors, match, mount_at
 from strapdown.recording import Reference
 from strapdown.report.figures import (
     AXIS_COLORS,
@@ -15,7 +15,7 @@ from strapdown.report.figures import (
     sigma_band,
     time_figure,
 )
-from strapdown.report.page import Block, Section, plot, table
+from strapdown.report.page import Block, Section, number, plot, table
 from strapdown.report.scene import frame_rows, scene
 from strapdown.rotation import quat_conj, quat_mul, rpy_from_quat
 from strapdown.solution import Solution, Status
@@ -80,8 +80,11 @@ def attitude_section(
     if turned is not None:
         t_ref, q_ref = turned
         if sol.q_vb is not None:
-            t_ref, q_ref = _through_mount(reference, t_ref, q_ref)
-        rpy_ref = (t_ref, rpy_from_quat(q_ref) / DEG) if len(t_ref) else None
+            mount = reference.mount if reference is not None else None
+            q_vb = mount_at(mount, t_ref) if mount is not None else None
+            q_ref = quat_mul(q_ref, quat_conj(q_vb)) if q_vb is not None else q_ref[:0]
+        if len(q_ref):
+            rpy_ref = (t_ref, rpy_from_quat(q_ref) / DEG)
     panels = []
     for column, name in enumerate(("roll", "pitch", "yaw")):
         period = None if name == "pitch" else TURN_DEG
@@ -115,18 +118,6 @@ def _heading(sol: Solution) -> str:
     }[sol.heading_reference]
 
 
-def _through_mount(
-    reference: Reference | None, t: FloatArray, q_nb: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Return the reference's attitude of the vehicle where its mount is known."""
-    if reference is None or reference.mount is None:
-        return t[:0], q_nb[:0]
-    mount = reference.mount
-    use = ~mount.nan_rows() if mount.valid is None else mount.valid & ~mount.nan_rows()
-    found = match(mount.t[use], t, max_gap=5.0)
-    return t[found.rows], quat_mul(q_nb[found.rows], quat_conj(found.quats(mount.q_vb[use])))
-
-
 # --- errors -----------------------------------------------------------------------------
 
 
@@ -140,15 +131,16 @@ def error_table(errors: AttitudeErrors) -> Block:
         ("attitude error", "RMSE [°]", "median [°]", "95 % [°]", "maximum [°]"),
         rows,
         caption="Attitude errors against the reference",
+        digits=3,
     )
 
 
 def error_notes(errors: AttitudeErrors) -> list[str]:
     """Return what must be known to read the attitude errors, one sentence each."""
-    notes = [f"{len(errors):,} samples of the reference count.".replace(",", "\u202f")]
+    notes = [f"{number(len(errors))} samples of the reference count."]
     if errors.left_out:
-        listed = ", ".join(f"{count:,} {why}" for why, count in errors.left_out.items())
-        notes.append(f"Left out: {listed}.".replace(",0", ",0"))
+        listed = ", ".join(f"{number(count)} {why}" for why, count in errors.left_out.items())
+        notes.append(f"Left out: {listed}.")
     notes.append(errors.heading_note)
     if errors.axes == "vehicle":
         notes.append("Roll, pitch and yaw are those of the vehicle, by the reference's mount.")
@@ -161,7 +153,7 @@ def error_notes(errors: AttitudeErrors) -> list[str]:
     return notes
 
 
-def error_section(errors: AttitudeErrors) -> Section:
+def error_section(errors: AttitudeErrors, span: tuple[float, float] | None = None) -> Section:
     """Return the attitude errors over time, with 3 sigma where it is stated."""
 
     def panel(name: str, values: FloatArray, sigma: FloatArray | None = None) -> Panel:
@@ -171,24 +163,28 @@ def error_section(errors: AttitudeErrors) -> Section:
         items.append(Series(x=errors.t, y=values / DEG, name="error", color=ESTIMATE))
         return Panel(y_label=f"{name} [°]", items=items, height=125)
 
-    split = [panel("total", errors.total), panel("heading", errors.heading)]
-    split.append(panel("inclination", errors.inclination))
-    blocks = [plot(time_figure(split))]
     std = errors.std_n
+    split = [
+        panel("total", errors.total),
+        panel("inclination", errors.inclination),
+        panel("heading", errors.heading, None if std is None else std[:, 2]),
+    ]
     if std is not None:
-        tilt = [
-            panel("about north", errors.tilt_n[:, 0], std[:, 0]),
-            panel("about east", errors.tilt_n[:, 1], std[:, 1]),
-            panel("about down", errors.heading, std[:, 2]),
-        ]
-        note = "The same errors about the axes of n, within what the estimator states."
-        blocks.append(plot(time_figure(tilt), note))
+        split.append(panel("about north", errors.tilt_n[:, 0], std[:, 0]))
+        split.append(panel("about east", errors.tilt_n[:, 1], std[:, 1]))
     names = ("roll", "pitch", "yaw")
     rpy = [panel(f"{name} error", errors.rpy[:, i]) for i, name in enumerate(names)]
-    blocks.append(plot(time_figure(rpy)))
     return Section(
         title="Attitude errors",
         intro="Estimate less reference, where the reference counts. Heading: about the "
-        "vertical, positive clockwise. Inclination: between the two verticals.",
-        blocks=blocks,
+        "vertical, positive clockwise. Inclination: between the two verticals, made of the "
+        "parts about north and east.",
+        blocks=[
+            plot(time_figure(split, span=span)),
+            plot(
+                time_figure(rpy, span=span),
+                "Near a pitch of ±90° roll and yaw are not defined: their differences grow "
+                "there without meaning.",
+            ),
+        ],
     )

@@ -27,6 +27,7 @@ BAND_OPACITY = 0.16
 MARGIN_LEFT, MARGIN_RIGHT, MARGIN_TOP, MARGIN_BOTTOM = 72, 16, 34, 46
 PANEL_GAP = 16
 BAND_BUCKETS = 500  # standard deviations are smooth
+DECADES_WITH_MINOR = 2.5  # a logarithmic axis of more shows powers of ten alone
 LARGE_TIME = 1e5  # beyond it a float32 of seconds is too coarse to read
 
 
@@ -142,7 +143,12 @@ def sigma_band(
     return Band(x=t, low=centre - 3.0 * sigma, high=centre + 3.0 * sigma, name=name)
 
 
-def time_figure(panels: Sequence[Panel], *, buckets: int = decimate.BUCKETS) -> Figure:
+def time_figure(
+    panels: Sequence[Panel],
+    *,
+    span: tuple[float, float] | None = None,
+    buckets: int = decimate.BUCKETS,
+) -> Figure:
     """Return panels one above the other that share one time axis.
 
     All time figures of a page zoom together.
@@ -151,6 +157,8 @@ def time_figure(panels: Sequence[Panel], *, buckets: int = decimate.BUCKETS) -> 
     ----------
     panels : sequence of Panel
         From top to bottom.
+    span : tuple of float, optional
+        First and last time of the axis [s]; otherwise those of what is drawn.
     buckets : int
         Detail of the lines, see `decimate`.
 
@@ -163,6 +171,7 @@ def time_figure(panels: Sequence[Panel], *, buckets: int = decimate.BUCKETS) -> 
     layout["meta"] = {"time": True}
     layout["hoversubplots"] = "axis"
     layout["xaxis"] = _axis("time [s]") | {
+        "range": list(span or _span(panels)),
         "anchor": _axis_name("y", len(panels)),
         "showspikes": True,
         "spikemode": "across",
@@ -174,6 +183,8 @@ def time_figure(panels: Sequence[Panel], *, buckets: int = decimate.BUCKETS) -> 
     top = inner
     for number, panel in enumerate(panels, 1):
         domain = [(top - panel.height) / inner, top / inner]
+        layout["shapes"].append(_frame([0.0, 1.0], domain))
+        layout["annotations"].append(_y_title(panel.y_label, 0.0, domain))
         top -= panel.height + PANEL_GAP
         layout["yaxis" + _suffix(number)] = _y_axis(panel) | {"domain": domain, "anchor": "x"}
         data += _traces(panel, "x", _axis_name("y", number), buckets)
@@ -204,7 +215,6 @@ def grid_figure(
     inner = sum(heights) + between * (len(rows) - 1)
     layout = _layout(inner)
     layout["hovermode"] = "closest"
-    layout["annotations"] = []
     data: list[dict[str, Any]] = []
     gap = 0.09 if columns > 1 else 0.0
     width = (1.0 - gap * (columns - 1)) / columns
@@ -217,10 +227,10 @@ def grid_figure(
             x_axis = _axis(panel.x_label) | {"domain": [left, left + width], "anchor": y_name}
             if panel.log_x:
                 x_axis["type"] = "log"
-            y_axis = _y_axis(panel) | {
-                "domain": [(top - height) / inner, top / inner],
-                "anchor": x_name,
-            }
+            domain = [(top - height) / inner, top / inner]
+            y_axis = _y_axis(panel) | {"domain": domain, "anchor": x_name}
+            layout["shapes"].append(_frame([left, left + width], domain))
+            layout["annotations"].append(_y_title(panel.y_label, left, domain))
             if panel.equal:
                 y_axis |= {"scaleanchor": x_name, "scaleratio": 1}
                 x_axis["constrain"] = y_axis["constrain"] = "range"
@@ -301,8 +311,10 @@ def _layout(inner: int) -> dict[str, Any]:
                  "color": "#252b33"},
         "hovermode": "x unified",
         "hoverlabel": {"font": {"size": 11}},
-        "legend": {"orientation": "h", "x": 1, "xanchor": "right", "y": 1, "yanchor": "bottom",
-                   "tracegroupgap": 0},
+        "legend": {"orientation": "h", "x": 0, "xanchor": "left", "y": 1, "yanchor": "bottom",
+                   "tracegroupgap": 0, "itemsizing": "constant"},
+        "shapes": [],
+        "annotations": [],
         "dragmode": "zoom",
     }  # fmt: skip
 
@@ -312,9 +324,6 @@ def _axis(label: str) -> dict[str, Any]:
         "title": {"text": label, "standoff": 8},
         "gridcolor": "#e7eaee",
         "zeroline": False,
-        "showline": True,
-        "mirror": True,
-        "linecolor": "#b9c0c9",
         "ticks": "outside",
         "ticklen": 4,
         "tickcolor": "#b9c0c9",
@@ -323,9 +332,11 @@ def _axis(label: str) -> dict[str, Any]:
 
 
 def _y_axis(panel: Panel) -> dict[str, Any]:
-    axis = _axis(panel.y_label)
+    axis = _axis("")
     if panel.log_y:
-        axis["type"] = "log"
+        axis |= {"type": "log", "dtick": 1 if _decades(panel) > DECADES_WITH_MINOR else "D2"}
+    elif _turns(panel):
+        axis["dtick"] = 90
     elif not panel.y_ticks:
         axis |= {"zeroline": True, "zerolinecolor": "#c9ced6", "zerolinewidth": 1}
     if panel.y_range is not None:
@@ -341,6 +352,51 @@ def _y_axis(panel: Panel) -> dict[str, Any]:
             "showgrid": False,
         }
     return axis
+
+
+def _span(panels: Sequence[Panel]) -> tuple[float, float]:
+    """Return the first and the last time of all that is drawn."""
+    ends = [x for p in panels for item in p.items if len(item.x) for x in item.x[[0, -1]]]
+    return (float(min(ends)), float(max(ends))) if ends else (0.0, 1.0)
+
+
+def _decades(panel: Panel) -> float:
+    """Return how many decades the series of a logarithmic panel span."""
+    parts = [item.y[item.y > 0.0] for item in panel.items if isinstance(item, Series)]
+    parts = [part for part in parts if len(part)]
+    if not parts:
+        return 0.0
+    low, high = min(p.min() for p in parts), max(p.max() for p in parts)
+    return float(np.log10(high / low))
+
+
+def _turns(panel: Panel) -> bool:
+    """Return whether the panel shows angles [deg] over more than half a turn."""
+    return any(
+        isinstance(item, Series)
+        and item.period == 360.0
+        and len(item.y) > 0
+        and not np.isnan(item.y).all()
+        and np.nanmax(item.y) - np.nanmin(item.y) > 180.0
+        for item in panel.items
+    )
+
+
+def _frame(x: list[float], y: list[float]) -> dict[str, Any]:
+    """Return the border of a panel; plotly's own lines stop at the lowest one."""
+    return {
+        "type": "rect", "xref": "paper", "yref": "paper", "x0": x[0], "x1": x[1], "y0": y[0],
+        "y1": y[1], "line": {"color": "#b9c0c9", "width": 1}, "layer": "below",
+    }  # fmt: skip
+
+
+def _y_title(label: str, left: float, domain: list[float]) -> dict[str, Any]:
+    """Return the label of a y axis; unlike plotly's own, all stand in one line."""
+    return {
+        "text": label, "showarrow": False, "textangle": -90, "x": left, "xref": "paper",
+        "xanchor": "center", "xshift": -58, "y": 0.5 * (domain[0] + domain[1]), "yref": "paper",
+        "yanchor": "middle",
+    }  # fmt: skip
 
 
 def _heading(text: str, left: float, top: float) -> dict[str, Any]:

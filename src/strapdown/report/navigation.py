@@ -172,10 +172,11 @@ def error_table(errors: NavigationErrors) -> Block:
         ("error", "RMSE", "median", "95 %", "maximum"),
         rows,
         caption="Position and velocity errors against the reference",
+        digits=3,
     )
 
 
-def error_section(errors: NavigationErrors) -> Section:
+def error_section(errors: NavigationErrors, span: tuple[float, float] | None = None) -> Section:
     """Return position and velocity errors over time, with 3 sigma where it is stated."""
     blocks = []
     for values, std, what, unit in (
@@ -191,7 +192,7 @@ def error_section(errors: NavigationErrors) -> Section:
                 items.append(sigma_band(errors.t, std[:, i]))
             items.append(Series(x=errors.t, y=values[:, i], name="error"))
             panels.append(Panel(y_label=f"{axis} [{unit}]", items=items, height=120))
-        blocks.append(plot(time_figure(panels), f"Errors of the {what}."))
+        blocks.append(plot(time_figure(panels, span=span), f"Errors of the {what}."))
     return Section(
         title="Position errors",
         intro="Estimate less reference, where the reference counts.",

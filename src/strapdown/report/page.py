@@ -98,7 +98,13 @@ def cards(items: Iterable[tuple[str, str, str]]) -> Block:
     return Block(html=f'<div class="cards">{body}</div>')
 
 
-def table(columns: Sequence[str], rows: Iterable[Sequence[object]], *, caption: str = "") -> Block:
+def table(
+    columns: Sequence[str],
+    rows: Iterable[Sequence[object]],
+    *,
+    caption: str = "",
+    digits: int = 4,
+) -> Block:
     """Return a table.
 
     Parameters
@@ -109,6 +115,8 @@ def table(columns: Sequence[str], rows: Iterable[Sequence[object]], *, caption: 
         Cells: text, whole numbers, floats or None. Numbers stand to the right.
     caption : str
         Heading of the table.
+    digits : int
+        Significant digits of the numbers.
 
     Returns
     -------
@@ -119,7 +127,7 @@ def table(columns: Sequence[str], rows: Iterable[Sequence[object]], *, caption: 
         if isinstance(value, bool):
             return f"<td>{'yes' if value else 'no'}</td>"
         if value is None or isinstance(value, (int, float)):
-            return f'<td class="number">{escape(number(value))}</td>'
+            return f'<td class="number">{escape(number(value, digits))}</td>'
         return f"<td>{escape(value)}</td>"
 
     body = [list(row) for row in rows]
@@ -179,6 +187,12 @@ def render(page: Page) -> str:
     if "plotly" in needs:
         scripts.insert(0, _plotly())
     anchors = [f"s{i}" for i in range(1, len(sections) + 1)]
+    linked = (
+        '<label class="tools"><input type="checkbox" id="linked" checked> zoom all time axes '
+        "together</label>"
+        if "plotly" in needs
+        else ""
+    )
     links = "".join(
         f'<a href="#{anchor}">{escape(section.title)}</a>'
         for anchor, section in zip(anchors, sections, strict=True)
@@ -192,7 +206,7 @@ def render(page: Page) -> str:
             f"<title>{escape(page.title)}</title><style>{_asset('page.css')}</style></head>\n",
             f"<body><header><h1>{escape(page.title)}</h1>",
             f'<p class="subtitle">{escape(page.subtitle)}</p>' if page.subtitle else "",
-            f"</header><nav>{links}</nav><main>\n",
+            f"</header><nav>{links}{linked}</nav><main>\n",
             '<noscript><p class="note">Figures need JavaScript; the tables do not.</p></noscript>',
             *(
                 _section(anchor, section)

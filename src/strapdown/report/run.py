@@ -70,17 +70,18 @@ def compose(
     of_position = errors if isinstance(errors, NavigationErrors) else None
     of_attitude = errors.attitude if isinstance(errors, NavigationErrors) else errors
     name = str(rec.meta.get("name") or "recording")
+    span = (float(sol.t[0]), float(sol.t[-1])) if len(sol.t) else None
     sections = [
         _summary(sol, rec, of_attitude, of_position),
         attitude.scene_section(sol, rec.reference, of_attitude),
         attitude.attitude_section(sol, rec.reference, of_attitude),
     ]
     if of_attitude is not None:
-        sections.append(attitude.error_section(of_attitude))
+        sections.append(attitude.error_section(of_attitude, span))
     if sol.is_navigation:
         sections.append(navigation.track_section(sol, rec))
         if of_position is not None:
-            sections.append(navigation.error_section(of_position))
+            sections.append(navigation.error_section(of_position, span))
         sections += [navigation.sigma_section(sol), navigation.mount_section(sol)]
     sections += [
         health.bias_section(sol),
@@ -128,11 +129,7 @@ def _summary(
     cards = [
         ("duration", page.number(duration), "s"),
         ("samples", page.number(n), ""),
-        (
-            "heading",
-            sol.heading_reference,
-            "north" if sol.heading_reference != "arbitrary" else "",
-        ),
+        ("heading from north", sol.heading_reference, ""),
         ("with attitude", f"{100.0 * ready:.1f}", "%"),
     ]
     if of_position is not None:
@@ -161,16 +158,23 @@ def _summary(
     return Section(title="Summary", blocks=blocks)
 
 
-def _parameters(meta: Mapping[str, object]) -> list[tuple[str, object]]:
+def _parameters(meta: Mapping[str, object]) -> list[tuple[str, str]]:
     """Return the estimator's parameters and other facts, nested ones with dotted names."""
-    rows: list[tuple[str, object]] = []
+    rows: list[tuple[str, str]] = []
     for key, value in meta.items():
-        if isinstance(value, Mapping):
+        if key == "parameters" and isinstance(value, Mapping):
+            rows += _parameters(value)
+        elif isinstance(value, Mapping):
             rows += [(f"{key}.{name}", inner) for name, inner in _parameters(value)]
         elif isinstance(value, (list, tuple, np.ndarray)):
-            rows.append(
-                (key, ", ".join(f"{v:g}" if isinstance(v, float) else str(v) for v in value))
-            )
+            rows.append((key, ", ".join(_short(item) for item in value)))
         else:
-            rows.append((key, value))
+            rows.append((key, _short(value)))
     return rows
+
+
+def _short(value: object) -> str:
+    """Return a value as one would type it."""
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return f"{value:.6g}" if isinstance(value, float) else str(value)

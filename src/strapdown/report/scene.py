@@ -43,13 +43,13 @@ def scene(
         "t": packed(t, "f8")["bdata"],
         "estimate": packed(q_nb)["bdata"],
         "gap_s": _gap(t),
-        "start_s": float(t[int(np.flatnonzero(known)[0]) if known.any() else 0]),
     }
     if reference is not None:
-        there = ~np.isnan(reference).any(axis=1)
+        there = np.asarray(~np.isnan(reference).any(axis=1))
         bits |= there.astype(np.uint8) << 1
         data["reference"] = packed(np.where(there[:, np.newaxis], reference, 0.0))["bdata"]
     data["known"] = packed(bits, "u1")["bdata"]
+    data["start_s"] = float(t[np.argmax(bits)])  # where both are known, or else the estimate
     return Block(html=_html(data, with_reference=reference is not None), needs=("scene",))
 
 

@@ -4,6 +4,7 @@
   "use strict";
   const CONFIG = {
     displaylogo: false,
+    doubleClick: "reset",
     responsive: true,
     plotlyServerURL: "",
     modeBarButtonsToRemove: ["lasso2d", "select2d", "autoScale2d"],
@@ -23,10 +24,10 @@
     plot.dataset.drawn = "1";
     const spec = JSON.parse(plot.nextElementSibling.textContent);
     const time = spec.layout.meta && spec.layout.meta.time;
-    if (time && range) spec.layout.xaxis.range = range.slice();
     Plotly.newPlot(plot, spec.data, spec.layout, CONFIG);
     drawn.push(plot);
     if (!time) return;
+    if (range) Plotly.relayout(plot, { "xaxis.range": range.slice() });
     plot.on("plotly_relayout", (change) => follow(plot, change));
     plot.on("plotly_click", (event) => {
       const detail = { t: event.points[0].x };

@@ -113,7 +113,7 @@
       const ca = Math.cos(azimuth);
       const se = Math.sin(elevation);
       const ce = Math.cos(elevation);
-      const scale = Math.min(width, height * 1.35) * 0.29;
+      const scale = Math.min(width, height * 1.5) * 0.225;
 
       /* east, north, up to pixels, and how near */
       function project(p) {
@@ -121,7 +121,7 @@
         const up = -sa * se * p[0] - ca * se * p[1] + ce * p[2];
         const near = sa * ce * p[0] + ca * ce * p[1] + se * p[2];
         const k = (scale * 6) / (6 - near);
-        return [width / 2 + k * right, height * 0.46 - k * up, near];
+        return [width / 2 + k * right, height * 0.37 - k * up, near];
       }
 
       function stroke(points, color, line, dash, close) {
@@ -148,22 +148,22 @@
       }
 
       function compass() {
-        const ground = -1.15;
+        const ground = -1.05;
         const ring = (radius) => Array.from({ length: 73 }, (_, i) => {
           const a = (i * 5) / DEG;
           return [radius * Math.sin(a), radius * Math.cos(a), ground];
         });
-        stroke(ring(1.5), "#b9c4cf", 1.2);
-        stroke(ring(0.75), "#d3dbe3", 1);
+        stroke(ring(1.35), "#b9c4cf", 1.2);
+        stroke(ring(0.7), "#d3dbe3", 1);
         for (let i = 0; i < 36; i += 1) {
           const a = (i * 10) / DEG;
-          const inner = i % 9 === 0 ? 0 : i % 3 === 0 ? 1.4 : 1.45;
+          const inner = i % 9 === 0 ? 0 : i % 3 === 0 ? 1.25 : 1.3;
           const radial = (r) => [r * Math.sin(a), r * Math.cos(a), ground];
-          stroke([radial(inner), radial(1.5)], i % 9 === 0 ? "#c3cdd7" : "#b9c4cf", 1);
+          stroke([radial(inner), radial(1.35)], i % 9 === 0 ? "#c3cdd7" : "#b9c4cf", 1);
         }
         ["N", "E", "S", "W"].forEach((name, i) => {
           const a = (i * 90) / DEG;
-          const p = [1.68 * Math.sin(a), 1.68 * Math.cos(a), ground];
+          const p = [1.53 * Math.sin(a), 1.53 * Math.cos(a), ground];
           label(name, p, name === "N" ? "#1d232b" : "#76828f", name === "N" ? 15 : 12);
         });
       }

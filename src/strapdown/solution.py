@@ -174,13 +174,14 @@ class Solution:
         ValueError
             If there is no position.
         """
-        from strapdown.earth import lla_offset
-        from strapdown.rotation import quat_conj, quat_mul, quat_rotate, rotvec_from_quat
+        from strapdown.earth import dcm_ne, ecef_from_lla, lla_from_ecef
+        from strapdown.rotation import quat_conj, quat_mul, rotate, rotvec_from_quat
 
         if self.lla is None:
             raise ValueError("`at` needs a solution with position, this one has attitude only.")
-        arm_n = quat_rotate(self.q_nb, _checks.as_vector("lever_arm_b", lever_arm_b))
-        lla = lla_offset(self.lla, arm_n)
+        arm_n = rotate(self.q_nb, _checks.as_vector("lever_arm_b", lever_arm_b))
+        arm_e = np.einsum("kij,ki->kj", dcm_ne(self.lla), arm_n)
+        lla = lla_from_ecef(ecef_from_lla(self.lla) + arm_e)
         v_n = self.v_n
         if v_n is not None and len(self.t) > 1:
             dq = quat_mul(self.q_nb[1:], quat_conj(self.q_nb[:-1]))

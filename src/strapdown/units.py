@@ -292,10 +292,14 @@ def parse_unit(text: str, quantity: str | None = None) -> Unit:
     InputError
         If no unit is spelled so, or it measures something else. The message offers
         the nearest name.
+    TypeError
+        If `text` is not a string.
     """
     if quantity is not None:
         one_of("quantity", quantity, QUANTITIES)
-    found = _BY_KEY.get(_key(text), []) if isinstance(text, str) else []
+    if not isinstance(text, str):
+        raise TypeError(f"a unit must be text, got {text!r}.")
+    found = _BY_KEY.get(_key(text), [])
     fitting = [unit for unit in found if quantity in (None, unit.quantity)]
     if len(fitting) > 1:  # let the letters' case decide
         fitting = [unit for unit in fitting if text.strip("()[]{} ") in (unit.symbol, unit.name)]

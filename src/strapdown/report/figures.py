@@ -27,7 +27,7 @@ BAND_OPACITY = 0.16
 MARGIN_LEFT, MARGIN_RIGHT, MARGIN_TOP, MARGIN_BOTTOM = 72, 16, 34, 46
 PANEL_GAP = 16
 BAND_BUCKETS = 500  # standard deviations are smooth
-DECADES_WITH_MINOR = 2.5  # a logarithmic axis of more shows powers of ten alone
+DECADES_WITH_MINOR = 1.5  # a logarithmic axis of more shows powers of ten alone
 LARGE_TIME = 1e5  # beyond it a float32 of seconds is too coarse to read
 
 
@@ -316,6 +316,7 @@ def _layout(inner: int) -> dict[str, Any]:
         "shapes": [],
         "annotations": [],
         "dragmode": "zoom",
+        "separators": ".\u202f",
     }  # fmt: skip
 
 
@@ -361,7 +362,9 @@ def _span(panels: Sequence[Panel]) -> tuple[float, float]:
 
 
 def _decades(panel: Panel) -> float:
-    """Return how many decades the series of a logarithmic panel span."""
+    """Return how many decades a logarithmic panel spans."""
+    if panel.y_range is not None:
+        return float(np.log10(panel.y_range[1] / panel.y_range[0]))
     parts = [item.y[item.y > 0.0] for item in panel.items if isinstance(item, Series)]
     parts = [part for part in parts if len(part)]
     if not parts:
@@ -447,7 +450,7 @@ def _series(series: Series, buckets: int) -> dict[str, Any]:
     x, y = series.x, series.y
     if series.kind == "bars":
         return {
-            "type": "bar", "x": packed(x, "f8"), "y": packed(y, "f8"),
+            "type": "bar", "showlegend": False, "x": packed(x, "f8"), "y": packed(y, "f8"),
             "marker": {"color": series.color}, "width": series.width,
             "hovertemplate": "%{x:.5g}: %{y}<extra></extra>",
         }  # fmt: skip

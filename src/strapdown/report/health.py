@@ -85,6 +85,7 @@ def status_section(sol: Solution) -> Section:
 def status_table(sol: Solution) -> Block:
     """Return how often each flag is set, and what it means."""
     rows = []
+    interval = float(np.median(np.diff(sol.t))) if len(sol.t) > 1 else 0.0
     for flag in Status:
         mask = (sol.status & flag).astype(np.bool_)
         first, last = decimate.runs(mask)
@@ -96,7 +97,7 @@ def status_table(sol: Solution) -> Block:
                     100.0 * float(mask.mean()),
                     len(first),
                     float(sol.t[first[0]]),
-                    float((sol.t[last] - sol.t[first]).max()),
+                    float((sol.t[last] - sol.t[first]).max()) + interval,
                     FLAGS[flag].meaning,
                 )
             )
@@ -106,7 +107,7 @@ def status_table(sol: Solution) -> Block:
 
 def skipped_blocks(sol: Solution) -> list[Block]:
     """Return which samples the estimator skipped, by reason."""
-    reasons = (Status.GYR_INVALID, Status.ACC_INVALID, Status.MAG_INVALID, Status.GAP)
+    reasons = (Status.GYR_INVALID, Status.ACC_INVALID, Status.MAG_INVALID)
     rows = []
     for flag in reasons:
         hit = np.flatnonzero(sol.status & flag)

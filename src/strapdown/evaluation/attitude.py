@@ -101,7 +101,8 @@ class AttitudeErrors:
         needed = self._needed()
         if needed is None:
             return None
-        reached = float(np.quantile(needed, COVERAGE))
+        last = max(0, int(np.ceil(COVERAGE * len(needed))) - 1)
+        reached = float(np.partition(needed, last)[last])  # may be infinite
         return 3.0 / reached if reached > 0.0 else float("inf")
 
     def summary(self) -> dict[str, float | int | str | bool | None]:
@@ -259,7 +260,7 @@ def _tilt(error: FloatArray) -> FloatArray:
     angle = 2.0 * np.arctan2(sideways, upright)
     cos_half = np.divide(w, upright, out=np.ones_like(w), where=upright > 0.0)
     sin_half = np.divide(z, upright, out=np.zeros_like(w), where=upright > 0.0)
-    scale = np.divide(angle, sideways, out=np.full_like(w, 2.0), where=sideways > 0.0)
+    scale = np.divide(angle, sideways, out=np.zeros_like(w), where=sideways > 0.0)
     return np.stack(
         ((x * cos_half - y * sin_half) * scale, (y * cos_half + x * sin_half) * scale), axis=1
     )

@@ -1,0 +1,232 @@
+"""The main job: a recording in, a folder of results and a short table out."""
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from strapdown import __version__
+from strapdown.cli import _console, _errors, _output, _settings
+from strapdown.errors import DataGap, InputError
+
+if TYPE_CHECKING:
+    from strapdown.evaluation import AttitudeErrors, NavigationErrors
+    from strapdown.recording import Recording
+    from strapdown.solution import Solution
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Job:
+    """What to do with a recording.
+
+    Parameters
+    ----------
+    folder : path
+        Where the results go.
+    filter : str, optional
+        Registry name; a sensible one for the recording's streams by default.
+    settings : sequence of str
+        Parameters of the estimator as ``key=value``.
+    calibration : path, optional
+        Calibration file to apply first.
+    smooth : bool
+        Whether to use the estimator's offline twin.
+    report : bool
+        Whether to write ``report.html``.
+    json : bool
+        Whether to print the summary as JSON instead of a table.
+    """
+
+    folder: Path
+    filter: str | None = None
+    settings: Sequence[str] = ()
+    calibration: Path | None = None
+    smooth: bool = False
+    report: bool = True
+    json: bool = False
+
+
+def do(job: Job, log: str, read: Callable[[], "Recording"]) -> None:
+    """Read, estimate, compare, write, print.
+
+    Parameters
+    ----------
+    job : Job
+        What to do.
+    log : str
+        Name of the log for the summary.
+    read : callable
+        Returns the recording.
+    """
+    if job.filter is not None:  # a misspelt option is found before a long log is read
+        _estimator(job.filter, job.settings)
+    with _console.progress(3 + job.report) as progress, _output.made_aside(job.folder) as aside:
+        progress.step(f"reading {log}")
+        begun = time.perf_counter()
+        rec = read()
+        if job.calibration is not None:
+            rec = _calibrated(rec, job.calibration)
+        timing = {"read_s": time.perf_counter() - begun}
+        for note in rec.meta.get("notes", ()):
+            progress.note(note)
+        summary = _results(job, log, rec, aside, timing, progress)
+        _output.write_text(aside / _output.SUMMARY, _console.to_json(summary))
+    if job.json:
+        _console.print_json(summary)
+    else:
+        _print(summary)
+
+
+def _results(
+    job: Job,
+    log: str,
+    rec: "Recording",
+    aside: Path,
+    timing: dict[str, float],
+    progress: _console.Progress,
+) -> dict[str, Any]:
+    """Run the estimator, write its files into `aside`, and return the summary."""
+    from strapdown import io
+
+    sol = _solution(job, log, rec, timing, progress)
+    progress.step("comparing with the reference" if rec.reference else "writing")
+    errors = _errors_of(sol, rec, progress)
+    files = {"solution": "solution.parquet", "summary": _output.SUMMARY}
+    io.write_solution(sol, aside / files["solution"])
+    begun = time.perf_counter()
+    if job.report:
+        from strapdown import report
+
+        progress.step("writing the report")
+        files["report"] = "report.html"
+        report.write(sol, rec, aside / files["report"], errors)
+    timing["report_s"] = time.perf_counter() - begun
+    return {
+        _output.MARK: f"strapdown {__version__}",
+        "log": log,
+        "filter": sol.filter,
+        "parameters": dict(sol.meta.get("parameters", {})),
+        "causal": sol.causal,
+        "samples": len(sol),
+        "duration_s": float(sol.t[-1] - sol.t[0]),
+        "status_counts": sol.status_counts(),
+        "heading_reference": sol.heading_reference,
+        "outputs": {key: str(job.folder / file) for key, file in files.items()},
+        "timing": timing,
+        "errors": None if errors is None else errors.summary(),
+    }
+
+
+def _estimator(name: str, settings: Sequence[str]) -> Any:
+    """Return the estimator `name` with its parameters as typed."""
+    from strapdown import estimator as estimators
+
+    with _errors.given("--filter"):
+        cls = estimators.entry(name).cls
+    given = _settings.parameters(name, cls, settings)
+    with _errors.given(f"--set {_settings.mapping_text(given)}"):
+        return estimators.create(name, **given)
+
+
+def _solution(
+    job: Job,
+    log: str,
+    rec: "Recording",
+    timing: dict[str, float],
+    progress: _console.Progress,
+) -> "Solution":
+    """Return what the estimator makes of the recording."""
+    from strapdown import estimator as estimators
+
+    with _errors.given(log):
+        name = job.filter or estimators.preferred(rec)
+    flt = _estimator(name, job.settings)
+    if job.smooth and not hasattr(flt, "smooth"):
+        raise InputError(f"{name} has no offline twin; leave --smooth out, or choose another.")
+    progress.step(f"estimating with {name}")
+    if not estimators.entry(name).is_compiled():
+        progress.note(f"compiling {name} (once)")
+    begun = time.perf_counter()
+    with _errors.given(log):
+        sol: Solution = flt.smooth(rec) if job.smooth else flt.run(rec)
+    timing["estimate_s"] = time.perf_counter() - begun
+    if len(sol) == 0:
+        raise InputError(f"{log}: the log must hold inertial samples, it has none.")
+    return sol
+
+
+def _errors_of(
+    sol: "Solution", rec: "Recording", progress: _console.Progress
+) -> "AttitudeErrors | NavigationErrors | None":
+    """Return the errors against the reference; None, and why, if nothing can be compared."""
+    from strapdown import evaluation
+
+    if rec.reference is None:
+        return None
+    try:
+        if sol.is_navigation and rec.reference.position is not None:
+            return evaluation.navigation_errors(sol, rec.reference)
+        if rec.reference.attitude is not None:
+            return evaluation.attitude_errors(sol, rec.reference)
+    except DataGap as gap:
+        progress.note(f"no errors: {gap}")
+    return None
+
+
+def _calibrated(rec: "Recording", file: Path) -> "Recording":
+    """Return the recording with a calibration file applied."""
+    try:
+        from strapdown import calibration
+    except ImportError:
+        raise InputError(f"--calibration needs a part that {__version__} lacks.") from None
+    with _errors.given(file):
+        calibrated: Recording = calibration.load(file).apply(rec)
+    return calibrated
+
+
+def _print(summary: dict[str, Any]) -> None:
+    """Print what one wants to know first."""
+    smoothed = "" if summary["causal"] else ", smoothed offline"
+    parameters = _settings.mapping_text(summary["parameters"])
+    counts = ", ".join(f"{name} {n}" for name, n in summary["status_counts"].items())
+    timing = summary["timing"]
+    rows = [
+        ("filter", f"{summary['filter']}{smoothed}" + (f" ({parameters})" if parameters else "")),
+        ("samples", f"{summary['samples']} in {summary['duration_s']:.1f} s"),
+        ("flagged", counts or "none"),
+        ("heading", summary["heading_reference"]),
+        (
+            "took",
+            f"read {timing['read_s']:.2f} s, estimate {timing['estimate_s']:.2f} s, "
+            f"report {timing['report_s']:.2f} s",
+        ),
+    ]
+    _console.print_table(summary["log"], ("", ""), rows)
+    errors = summary["errors"]
+    if errors is not None:
+        print()
+        _console.print_table(
+            "", ("error", "RMSE", "largest", ""), _error_rows(errors), right=(1, 2)
+        )
+        if errors.get("heading_constant_removed"):
+            constant = errors["heading_constant_deg"]
+            print(f"Heading is arbitrary: a constant of {constant:.1f} deg was removed.")
+        within = errors.get("inclination_within_3sigma")
+        if within is not None:
+            print(f"Inclination within its stated 3 sigma: {100 * within:.1f} % of the time.")
+    print()
+    for path in summary["outputs"].values():
+        print(path)
+
+
+def _error_rows(errors: dict[str, Any]) -> list[tuple[str, str, str, str]]:
+    """Return one row per kind of error that the summary has."""
+    rows = []
+    for key, value in errors.items():
+        name, found, unit = key.partition("_rmse_")
+        if found:
+            largest = errors.get(f"{name}_max_{unit}")
+            shown = "" if largest is None else f"{largest:.2f}"
+            rows.append((name, f"{value:.2f}", shown, unit.replace("m_s", "m/s")))
+    return rows

@@ -1,0 +1,5 @@
+"""``strapdown filters``: what there is."""
+
+
+def filters() -> None:
+    """List the estimators."""

@@ -115,6 +115,8 @@ def test_log_takes_the_short_way_round():
         (0.1, -0.2, 0.3), (3.1, 0.2, -0.1), (0.2, -3.1, 0.1), (-0.1, 0.2, 3.1),
         (np.pi, 0, 0), (0, np.pi, 0), (0, 0, np.pi), (1.81, 1.81, 1.81), (0.0, 0.0, 0.0),
         (-3.1, 0.2, -0.1), (-0.2, 3.1, 0.1), (-0.1, 0.2, -3.1),
+        # almost half a turn: there w is tiny, and dividing by it would cost three digits
+        (2.512, -1.508, 1.130), (-1.507, 2.512, 1.130), (1.130, 1.507, -2.512),
     ],
 )  # fmt: skip
 def test_quaternion_of_a_matrix_is_exact_at_every_angle(rotvec):
@@ -192,6 +194,7 @@ UP = (0.1, 0.2, -9.8)
         quat.from_acc_mag(*UP, *NOTHING),
         quat.from_acc_mag(*UP, *(5e-6 * np.array(UP))),
         quat.from_acc_mag(*UP, *(-5e-6 * np.array(UP) + 1e-11)),
+        quat.from_acc_mag(0.0, 0.0, -9.8, 7e-7, 0.0, 1.0),
         quat.from_acc_mag(*UP, math.nan, 0.0, 1.0),
     ],
 )
@@ -200,5 +203,5 @@ def test_vectors_without_a_direction_give_nan(q):
 
 
 def test_field_near_the_vertical_still_counts():
-    m_b = (2e-6, 0.0, 1.0)  # twice the least sine
+    m_b = (1.3e-6, 0.0, 1.0)  # a little above the least sine
     assert_allclose(quat.from_acc_mag(0.0, 0.0, -9.8, *m_b), IDENTITY, atol=EPS)

@@ -61,7 +61,7 @@ def log(w: float, x: float, y: float, z: float) -> tuple[float, float, float]:
     if w < 0.0:  # the same rotation, taken the short way
         w, x, y, z = -w, -x, -y, -z
     n2 = x * x + y * y + z * z
-    if n2 < 1e-8 * w * w:  # series of atan(t) / t: first term left out is t**4 / 5 < 3e-17
+    if n2 < 1e-8:  # series of atan(t) / t: first term left out is t**4 / 5 < 3e-17
         k = 2.0 / w * (1.0 - n2 / (3.0 * w * w))
     else:
         n = sqrt(n2)
@@ -164,26 +164,18 @@ def from_two_vectors(
     bx, by, bz = s * bx, s * by, s * bz
     kx, ky, kz = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
     k2 = kx * kx + ky * ky + kz * kz
-    if k2 < 1e-32:  # nothing but round-off is left of the cross product
-        if ax * bx + ay * by + az * bz > 0.0:
-            return 1.0, 0.5 * kx, 0.5 * ky, 0.5 * kz
-        # a crossed with the axis it is least along
-        if abs(ax) <= abs(ay) and abs(ax) <= abs(az):
-            kx, ky, kz = 0.0, az, -ay
-        elif abs(ay) <= abs(az):
+    if k2 < 1e-32:  # nothing but round-off is left of the cross product: take any normal
+        if abs(ay) <= abs(az):
             kx, ky, kz = -az, 0.0, ax
         else:
             kx, ky, kz = ay, -ax, 0.0
-        k2 = kx * kx + ky * ky + kz * kz
-    s = 1.0 / sqrt(k2)
-    kx, ky, kz = s * kx, s * ky, s * kz
     # Near 180 deg round-off tilts the axis towards a, which would turn a past b: take it out.
     s = kx * ax + ky * ay + kz * az
     kx, ky, kz = kx - s * ax, ky - s * ay, kz - s * az
     sx, sy, sz = ax + bx, ay + by, az + bz
     dx, dy, dz = ax - bx, ay - by, az - bz
-    w = sqrt(sx * sx + sy * sy + sz * sz)  # twice the half angle's cosine
-    s = sqrt((dx * dx + dy * dy + dz * dz) / (kx * kx + ky * ky + kz * kz))  # twice its sine
+    w = sqrt(sx * sx + sy * sy + sz * sz)  # twice the cosine of the half angle
+    s = sqrt((dx * dx + dy * dy + dz * dz) / (kx * kx + ky * ky + kz * kz))
     w, kx, ky, kz = normalize(w, s * kx, s * ky, s * kz)
     return w, kx, ky, kz
 

@@ -143,7 +143,8 @@ def quat_from_dcm(C_nb: ArrayLike) -> FloatArray:
             f"`C_nb` must be orthonormal within {DCM_TOLERANCE:g}, got C^T C off by "
             f"{np.nanmax(off):.3g}; `nearest_dcm` gives the nearest rotation."
         )
-    if (np.linalg.det(C) < 0.0).any():
+    # a triple product, since np.linalg.det warns of NaN
+    if (np.sum(np.cross(C[..., 0, :], C[..., 1, :]) * C[..., 2, :], axis=-1) < 0.0).any():
         raise ValueError(
             "`C_nb` must have determinant +1, got a mirror image (-1); "
             "an axis has the wrong sign or two are swapped."

@@ -12,6 +12,7 @@ import pytest
 
 from strapdown import report
 from strapdown.earth import lla_from_ned
+from strapdown.errors import FormatError
 from strapdown.evaluation import attitude_errors, navigation_errors
 from strapdown.recording import Gnss, MountReference, PositionReference, Recording
 from strapdown.report import page
@@ -286,7 +287,7 @@ def test_a_failed_write_leaves_the_old_file_and_no_other(run, tmp_path, monkeypa
         raise OSError("disk full")
 
     monkeypatch.setattr("os.replace", refuse)
-    with pytest.raises(OSError, match="disk full"):
+    with pytest.raises(FormatError, match="disk full"):
         report.write(sol, rec, path)
     assert path.read_text() == "old"
     assert [p.name for p in tmp_path.iterdir()] == ["report.html"]
@@ -294,7 +295,7 @@ def test_a_failed_write_leaves_the_old_file_and_no_other(run, tmp_path, monkeypa
 
 def test_a_folder_that_is_not_there_is_refused(run, tmp_path):
     sol, rec = run(300)
-    with pytest.raises(FileNotFoundError):
+    with pytest.raises(FormatError, match="cannot be written: there is no folder"):
         report.write(sol, rec, tmp_path / "no" / "report.html")
 
 

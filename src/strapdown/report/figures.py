@@ -28,6 +28,7 @@ MARGIN_LEFT, MARGIN_RIGHT, MARGIN_TOP, MARGIN_BOTTOM = 72, 16, 34, 46
 PANEL_GAP = 16
 BAND_BUCKETS = 500  # standard deviations are smooth
 DECADES_WITH_MINOR = 1.5  # a logarithmic axis of more shows powers of ten alone
+QUARTER_DEG = 90  # ticks of angles; the page frees them when one zooms in
 LARGE_TIME = 1e5  # beyond it a float32 of seconds is too coarse to read
 
 
@@ -337,7 +338,7 @@ def _y_axis(panel: Panel) -> dict[str, Any]:
     if panel.log_y:
         axis |= {"type": "log", "dtick": 1 if _decades(panel) > DECADES_WITH_MINOR else "D2"}
     elif _turns(panel):
-        axis["dtick"] = 90
+        axis["dtick"] = QUARTER_DEG
     elif not panel.y_ticks:
         axis |= {"zeroline": True, "zerolinecolor": "#c9ced6", "zerolinewidth": 1}
     if panel.y_range is not None:

@@ -15,6 +15,7 @@ from importlib import resources
 from pathlib import Path
 
 import strapdown
+from strapdown.io._atomic import written_aside
 from strapdown.report.figures import Figure
 
 POLICY = (
@@ -236,18 +237,13 @@ def write(page: Page, path: str | os.PathLike[str]) -> Path:
 
     Raises
     ------
-    OSError
+    FormatError
         If the folder does not exist or cannot be written to.
     """
     target = Path(path)
     content = render(page).encode("utf-8")
-    aside = target.with_name(f".{target.name}.{os.getpid()}.part")
-    try:
-        aside.write_bytes(content)
-        os.replace(aside, target)
-    except BaseException:
-        aside.unlink(missing_ok=True)
-        raise
+    with written_aside(target) as stream:
+        stream.write(content)
     return target
 
 

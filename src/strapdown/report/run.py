@@ -55,7 +55,7 @@ def write(
 
     Raises
     ------
-    OSError
+    FormatError
         If the file cannot be written.
     """
     return page.write(compose(sol, rec, errors, title), path)

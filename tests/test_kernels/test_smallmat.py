@@ -3,8 +3,9 @@
 import mpmath as mp
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose, assert_array_equal
+from numpy.testing import assert_array_equal
 from truth import rotations as truth
+from truth.compare import assert_close
 
 from strapdown.kernels import smallmat
 
@@ -39,16 +40,16 @@ def test_products_and_their_transposes(m, n, k):
     bound = (n + m) * EPS * 30.0  # sums of up to 16 products of numbers up to about 5
     out = np.empty((m, k))
     smallmat.mul(a, b, out)
-    assert_allclose(out, a @ b, atol=bound)
+    assert_close(out, a @ b, atol=bound)
     smallmat.mul_t(a, np.ascontiguousarray(b.T), out)
-    assert_allclose(out, a @ b, atol=bound)
+    assert_close(out, a @ b, atol=bound)
     smallmat.t_mul(np.ascontiguousarray(a.T), b, out)
-    assert_allclose(out, a @ b, atol=bound)
+    assert_close(out, a @ b, atol=bound)
     x, y = np.empty(m), b[:, 0].copy()
     smallmat.mul_vec(a, y, x)
-    assert_allclose(x, a @ y, atol=bound)
+    assert_close(x, a @ y, atol=bound)
     smallmat.t_mul_vec(np.ascontiguousarray(a.T), y, x)
-    assert_allclose(x, a @ y, atol=bound)
+    assert_close(x, a @ y, atol=bound)
 
 
 @pytest.mark.parametrize(("m", "n"), [(1, 1), (3, 3), (2, 6), (16, 16)])
@@ -57,7 +58,7 @@ def test_congruence_is_a_p_a_transposed_and_exactly_symmetric(m, n):
     out, work = np.empty((m, m)), np.empty((m, n))
     smallmat.congruence(a, P, work, out)
     expected = a @ P @ a.T
-    assert_allclose(out, expected, atol=n * n * EPS * np.abs(expected).max())
+    assert_close(out, expected, atol=n * n * EPS * np.abs(expected).max())
     assert_array_equal(out, out.T)
     if m == n:
         smallmat.congruence(a, P, work, P)
@@ -69,7 +70,7 @@ def test_rank_one_update_adds_alpha_v_v_transposed(n):
     P, v = covariance(n), random(n)
     expected = P - 0.3 * np.outer(v, v)
     smallmat.rank1_update(P, v, -0.3)
-    assert_allclose(P, expected, atol=4 * EPS * np.abs(expected).max())
+    assert_close(P, expected, atol=4 * EPS * np.abs(expected).max())
     assert_array_equal(P, P.T)
 
 
@@ -85,11 +86,11 @@ def test_cholesky_factor_and_solution(n, in_place):
     expected = np.linalg.cholesky(A)
     # backward stable: the error grows with n and with the condition number
     bound = n * EPS * np.linalg.cond(A)
-    assert_allclose(L, expected, atol=bound)
+    assert_close(L, expected, atol=bound)
     x = b.copy() if in_place else np.empty(n)
     smallmat.cholesky_solve(L, x if in_place else b, x)
     expected = np.linalg.solve(A, b)
-    assert_allclose(x, expected, atol=bound * np.abs(expected).max())
+    assert_close(x, expected, atol=bound * np.abs(expected).max())
 
 
 @pytest.mark.parametrize(
@@ -109,12 +110,12 @@ def test_update_is_josephs_form(n):
     s_true, k_true, P_true = joseph_truth(P, h, r)
     ph, gain = np.empty(n), np.empty(n)
     s = smallmat.innovation(P, h, r, ph)
-    assert_allclose(ph, P @ h, atol=n * EPS * 50.0)
+    assert_close(ph, P @ h, atol=n * EPS * 50.0)
     smallmat.update(P, h, r, s, ph, gain)
     bound = n * EPS * np.abs(P_true).max() * 20.0
     assert s == pytest.approx(s_true, rel=n * EPS * 4)
-    assert_allclose(gain, k_true, atol=n * EPS * 4)
-    assert_allclose(P, P_true, atol=bound)
+    assert_close(gain, k_true, atol=n * EPS * 4)
+    assert_close(P, P_true, atol=bound)
     assert_array_equal(P, P.T)
     assert smallmat.cholesky(P, np.empty((n, n)))
 
@@ -132,8 +133,8 @@ def test_sparse_row_gives_what_the_dense_row_gives(n):
     s = smallmat.innovation_sparse(P, index, values, 2, r, ph)
     smallmat.update_sparse(P, index, values, 2, r, s, ph, gain)
     assert s == pytest.approx(s_true, rel=n * EPS * 4)
-    assert_allclose(gain, k_true, atol=n * EPS * 4)
-    assert_allclose(P, P_true, atol=n * EPS * np.abs(P_true).max() * 20.0)
+    assert_close(gain, k_true, atol=n * EPS * 4)
+    assert_close(P, P_true, atol=n * EPS * np.abs(P_true).max() * 20.0)
     assert_array_equal(P, P.T)
 
 
@@ -149,8 +150,8 @@ def test_scalars_one_by_one_are_the_vector_update():
         s = smallmat.innovation(P, H[i], R[i, i], ph)
         smallmat.update(P, H[i], R[i, i], s, ph, gain)
         x += gain * residual
-    assert_allclose(x, x_true, atol=1e-13)  # eps times a condition number of some hundreds
-    assert_allclose(P, P_true, atol=1e-13)
+    assert_close(x, x_true, atol=1e-13)  # eps times a condition number of some hundreds
+    assert_close(P, P_true, atol=1e-13)
 
 
 @pytest.mark.parametrize("eps", [1e-6, 1e-8, 1e-9])
@@ -171,7 +172,7 @@ def test_joseph_form_stays_positive_where_the_short_form_does_not(eps):
         information += h * h.T
     expected = truth.to_float(information**-1)
     # the first update leaves an error of eps_machine / eps, the second does not add to it
-    assert_allclose(P, expected, rtol=2.0 * EPS / eps)
+    assert_close(P, expected, rtol=2.0 * EPS / eps)
     assert np.linalg.eigvalsh(P).min() > 0.3
     if eps < 1e-7:
         assert np.linalg.eigvalsh(short).min() < 0.0

@@ -64,9 +64,7 @@ def assemble(raw: RawLog, options: Options) -> Recording:
     meta = dict(raw.meta)
     if origin is not None:
         meta["epoch_utc"] = iso_utc(origin)
-    return Recording(
-        **streams, reference=Reference(**reference) if reference else None, meta=meta
-    )
+    return Recording(**streams, reference=Reference(**reference) if reference else None, meta=meta)
 
 
 def _build_imu(imu: dict[str, Part], raw: RawLog) -> recording.Imu:
@@ -84,7 +82,8 @@ def _build_imu(imu: dict[str, Part], raw: RawLog) -> recording.Imu:
     gyr, acc = imu["gyr"], imu["acc"]
     gyr_fields, acc_fields = fields_of(gyr), fields_of(acc)
     if gyr.t is acc.t or (len(gyr.t) == len(acc.t) and np.array_equal(gyr.t, acc.t)):
-        return make(recording.Imu, gyr, gyr_fields | acc_fields)
+        imu_stream: recording.Imu = make(recording.Imu, gyr, gyr_fields | acc_fields)
+        return imu_stream
     try:
         return _imu.merge(
             gyr.t, gyr_fields["gyr"], acc.t, acc_fields["acc"], gyr.table.file, raw.findings
@@ -191,5 +190,3 @@ def unit_quats(q: FloatArray, part: Part) -> FloatArray:
     exact = np.abs(norm - 1.0) < 1e-15
     norm[zero] = np.nan
     return np.where(exact[:, None], q, q / norm[:, None])
-
-

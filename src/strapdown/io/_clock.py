@@ -271,7 +271,5 @@ def advancing(
     done = f"{len(t) - len(order)} of {len(t)} samples dropped"
     if repair == "sort":
         done = f"sorted ({back} steps back), " + done
-    findings.append(
-        Finding(kind="time", what=f"times repaired: {done}", file=file, stream=stream)
-    )
+    findings.append(Finding(kind="time", what=f"times repaired: {done}", file=file, stream=stream))
     return order

@@ -23,6 +23,10 @@ class Meaning(NamedTuple):
     strange_unit: str | None = None
 
 
+def _split(words: str) -> list[str]:
+    return words.split()
+
+
 _SENSORS: Final = {
     "gyr": "gyr gyro gyros gyroscope gyroscopes gyrometer omega angvel angularvelocity"
     " angularrate rotationrate turnrate",
@@ -30,7 +34,7 @@ _SENSORS: Final = {
     " specificforce",
     "mag": "mag magn magneto magnetometer magnetic magfield magneticfield compass",
 }
-_SENSOR_OF: Final = {word: key for key, words in _SENSORS.items() for word in words.split()}
+_SENSOR_OF: Final = {word: key for key, words in _SENSORS.items() for word in _split(words)}
 _PAIRS: Final = {
     ("angular", "velocity"): "gyr",
     ("angular", "rate"): "gyr",
@@ -44,21 +48,27 @@ _AXES: Final = {"x": 0, "y": 1, "z": 2, "0": 0, "1": 1, "2": 2}
 
 # Words that make a column something other than a sample of the sensor.
 _OTHER: Final = frozenset(
-    "bias biases integral integrated delta dt std sigma var variance cov covariance norm"
-    " magnitude abs error offset scale clip clipping clipped device id count counter accuracy"
-    " status flag range user free gravity grav timestamp time stamp noise temp temperature rms"
-    " jerk setpoint sp".split()
+    _split(
+        "bias biases integral integrated delta dt std sigma var variance cov covariance norm"
+        " magnitude abs error offset scale clip clipping clipped device id count counter accuracy"
+        " status flag range user free gravity grav timestamp time stamp noise temp temperature rms"
+        " jerk setpoint sp"
+    )
 )
 # Gravity is taken off in these. ROS calls its specific force linear_acceleration, though.
 _NO_GRAVITY: Final = frozenset(("linear", "lin"))
 
 _TIME: Final = frozenset(
-    "t time timestamp timestamps ts datetime date epoch clock stamp elapsed millis micros"
-    " sampletime unixtime msec usec seconds secs".split()
+    _split(
+        "t time timestamp timestamps ts datetime date epoch clock stamp elapsed millis micros"
+        " sampletime unixtime msec usec seconds secs"
+    )
 )
 _TIME_COMPANY: Final = _TIME | frozenset(
-    "unix since start boot device sensor local system utc gps gnss field header log logging"
-    " recording sample rx host s sec ms us ns second ts txt imu reboot 1970 since1970".split()
+    _split(
+        "unix since start boot device sensor local system utc gps gnss field header log logging"
+        " recording sample rx host s sec ms us ns second ts txt imu reboot 1970 since1970"
+    )
 )
 _TIME_UNITS: Final = {"millis": "ms", "micros": "us", "elapsed": "", "seconds": "s", "secs": "s"}
 
@@ -67,8 +77,10 @@ _FUSED: Final = re.compile(
 )
 # Words in brackets or at the end that say nothing of interest.
 _NOISE: Final = frozenset(
-    "raw cal calibrated uncal uncalibrated filtered value values data txt val v sensor imu"
-    " n/a field the of axis total body b rs msg fast".split()
+    _split(
+        "raw cal calibrated uncal uncalibrated filtered value values data txt val v sensor imu"
+        " n/a field the of axis total body b rs msg fast"
+    )
 )
 
 

@@ -69,9 +69,7 @@ def split(raw: RawLog, options: Options) -> tuple[list[Part], int | None]:
     parts: list[Part] = []
     for table, axis in zip(tables, axes, strict=True):
         parts += _parts_of(table, axis.t, options, raw.findings)
-    if not raw.findings and not parts:
-        raw.findings.append(_nothing_known(raw))
-    elif not parts and not any(raw.faults()):
+    if not parts and not any(raw.faults()):
         raw.findings.append(_nothing_known(raw))
     return parts, origin
 
@@ -159,9 +157,7 @@ def _present(columns: Iterable[Column]) -> BoolArray | None:
     return None if empty is None else ~empty
 
 
-def _rows_by_group(
-    present: dict[str, BoolArray | None], n: int
-) -> dict[str, BoolArray | None]:
+def _rows_by_group(present: dict[str, BoolArray | None], n: int) -> dict[str, BoolArray | None]:
     """Return which rows are samples of each sensor, None for all.
 
     An aiding sensor has a sample where it has a cell. The gyroscope and the accelerometer share
@@ -182,7 +178,8 @@ def _rows_by_group(
         return rows
     either = np.zeros(n, dtype=np.bool_)
     for p in imu:
-        either |= p
+        if p is not None:
+            either |= p
     if gyr is not None and acc is not None:
         shared = np.count_nonzero(gyr & acc)
         if 2 * shared < max(np.count_nonzero(gyr), np.count_nonzero(acc)):

@@ -166,7 +166,7 @@ def read_raw(
     target = Path(path)
     handler = module(format) if format is not None else detect(target)
     _check_takes(handler, options)
-    raw = _guarded(handler.load, target, options)
+    raw: RawLog = _guarded(handler.load, target, options)
     if all(table.stream is None for table in raw.tables):
         split(raw, options)
     return raw
@@ -289,12 +289,12 @@ def _turned(rec: Recording, turns: dict[str, FloatArray]) -> Recording:
     from strapdown.rotation import quat_from_dcm, quat_mul
 
     box = turns.get("box")
-    C = {name: turns.get(name, box) for name in TURNED}
+    C = turns if box is None else dict.fromkeys(TURNED, box)
     parts: dict[str, Any] = {}
     if rec.imu is not None:
-        changed = {n: getattr(rec.imu, n) @ C[n].T for n in ("gyr", "acc") if C[n] is not None}
+        changed = {n: getattr(rec.imu, n) @ C[n].T for n in ("gyr", "acc") if n in C}
         parts["imu"] = replace(rec.imu, **changed)
-    if rec.mag is not None and C["mag"] is not None:
+    if rec.mag is not None and "mag" in C:
         parts["mag"] = replace(rec.mag, mag=rec.mag.mag @ C["mag"].T)
     if box is not None:
         q_old_new = quat_from_dcm(box.T)
@@ -314,7 +314,5 @@ def _turned_reference(reference: Reference, q_old_new: FloatArray) -> Reference:
         q_nb = quat_mul(reference.attitude.q_nb, q_old_new)
         parts["attitude"] = replace(reference.attitude, q_nb=q_nb)
     if reference.mount is not None:
-        parts["mount"] = replace(
-            reference.mount, q_vb=quat_mul(reference.mount.q_vb, q_old_new)
-        )
+        parts["mount"] = replace(reference.mount, q_vb=quat_mul(reference.mount.q_vb, q_old_new))
     return replace(reference, **parts)

@@ -9,13 +9,14 @@ class Role(NamedTuple):
 
     group: str
     field: str
-    index: int
+    component: int
     quantity: str
 
 
 def _triad(group: str, field: str, names: str, quantity: str) -> dict[str, Role]:
     return {
-        name: Role(group, field, index, quantity) for index, name in enumerate(names.split())
+        name: Role(group, field, component, quantity)
+        for component, name in enumerate(names.split())
     }
 
 

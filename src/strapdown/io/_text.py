@@ -240,12 +240,12 @@ def find_layout(path: Path, delimiter: str | None = None) -> Layout:
     if not any(line.strip() for line in lines):
         raise FormatError("the file is empty", file=path)
     remarks = [line for line in lines[:200] if COMMENT.match(line)]
-    plain = [
-        (k, line) for k, line in enumerate(lines) if line.strip() and not COMMENT.match(line)
-    ]
+    plain = [(k, line) for k, line in enumerate(lines) if line.strip() and not COMMENT.match(line)]
     if delimiter is None:
         delimiter = _choose_delimiter([line for _, line in plain[:60]] or remarks[-1:])
-    decimal = "," if delimiter != "," and _decimal_commas([line for _, line in plain[:60]]) else "."
+    decimal = (
+        "," if delimiter != "," and _decimal_commas([line for _, line in plain[:60]]) else "."
+    )
     rows = [(k, split_cells(line, delimiter)) for k, line in plain[:200]]
     widest = max((len(cells) for _, cells in rows), default=0)
     first = next(

@@ -16,7 +16,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from strapdown._types import FloatArray
+from strapdown._types import BoolArray, FloatArray
 from strapdown.errors import FormatError
 from strapdown.io._options import Options
 from strapdown.io._raw import Column, Finding, RawLog, Table
@@ -75,14 +75,16 @@ def read(path: Path, options: Options) -> tuple[Recording, RawLog]:
     t = np.arange(n) / rate
     for name in ("imu_gyr", "imu_acc", "imu_mag"):
         if name in arrays and n and np.isnan(arrays[name]).all():
-            raise FormatError(f"a sensor must have numbers, all {n} are NaN", file=path, stream=name)
+            raise FormatError(
+                f"a sensor must have numbers, all {n} are NaN", file=path, stream=name
+            )
     reference: Reference | None = None
     try:
         imu = Imu(t=t, gyr=arrays["imu_gyr"], acc=arrays["imu_acc"])
         mag = Mag(t=t, mag=arrays["imu_mag"] * UT) if "imu_mag" in arrays else None
         if "opt_quat" in arrays:
             q_nb = quat_ned_from_enu(arrays["opt_quat"])
-            seen = ~np.isnan(q_nb).any(axis=1)
+            seen: BoolArray = np.isfinite(q_nb).all(axis=-1)
             lost = int(np.count_nonzero(~seen))
             if lost:
                 what = f"the optical reference is lost in {lost} of {n} samples"
@@ -121,7 +123,8 @@ def _arrays(path: Path) -> dict[str, Any]:
     for name in _NEEDED:
         if name not in found:
             raise FormatError(
-                f"a trial of BROAD must hold {name}, found {', '.join(sorted(there)) or 'nothing'}",
+                f"a trial of BROAD must hold {name}, found "
+                + (", ".join(sorted(there)) or "nothing"),
                 file=path,
                 hint="export other data as CSV",
             )

@@ -12,13 +12,12 @@ from typing import IO, Any, Final
 
 import numpy as np
 
-from strapdown import _checks
-from strapdown.errors import FormatError, InputError
+from strapdown.errors import InputError
 from strapdown.io._blocks import read_numbers
-from strapdown.io._headers import Meaning, recognise_all
+from strapdown.io._headers import Meaning
+from strapdown.io._meaning import meanings_of
 from strapdown.io._options import Options
 from strapdown.io._raw import Column, Finding, RawLog, Table
-from strapdown.io._roles import ROLES
 from strapdown.io._text import (
     CLOCK_TIME,
     GZIP_MAGIC,
@@ -30,24 +29,12 @@ from strapdown.io._text import (
     open_text,
 )
 from strapdown.recording import Recording, Stream
-from strapdown.units import Unit, parse_unit, units_of
+from strapdown.units import Unit, parse_unit
 
 NAME: Final = "csv"
 DESCRIPTION: Final = "CSV, TSV and other columns of text, gzipped or not"
 SUFFIXES: Final = (".csv", ".tsv", ".txt", ".csv.gz", ".tsv.gz")
 TAKES: Final = frozenset(("columns", "units", "rate", "delimiter", "files"))
-
-# Units of programs that state none in their headers, recognised by names that only they use.
-_DIALECTS: Final[tuple[tuple[str, str, dict[str, str]], ...]] = (
-    (
-        "PX4",
-        r"gyro_rad\[0\]|accelerometer_m_s2\[0\]|magnetometer_ga\[0\]|timestamp_sample|device_id",
-        {"time": "us"},
-    ),
-    ("MAVLink", r"xacc|xgyro|xmag", {"gyr": "mrad_s", "acc": "mg", "mag": "mgauss"}),
-    ("ArduPilot", r"TimeUS", {"gyr": "rad_s", "acc": "m_s2", "mag": "mgauss"}),
-    ("Sensor Logger", r"seconds_elapsed", {"mag": "ut", "baro": "hpa"}),
-)
 
 
 def sniff(path: Path, head: bytes) -> bool:
@@ -84,7 +71,7 @@ def load_table(path: Path, options: Options, findings: list[Finding]) -> Table:
         If the file is empty, no text, or damaged.
     """
     layout = find_layout(path, options.delimiter)
-    meanings = _meanings(path, layout, options, findings)
+    meanings = _one_time(layout, _meanings(path, layout, options, findings))
     if layout.data_line == 0:
         what = (
             f"the file holds a header ({', '.join(filter(None, layout.names))[:80]}) "
@@ -121,9 +108,7 @@ def load_table(path: Path, options: Options, findings: list[Finding]) -> Table:
                 )
             )
         columns.append(
-            Column(
-                name=name, values=values, role=meaning.role, unit=unit, empty=numbers.empty[j]
-            )
+            Column(name=name, values=values, role=meaning.role, unit=unit, empty=numbers.empty[j])
         )
     return Table(file=str(path), columns=columns, line=numbers.line)
 
@@ -155,43 +140,20 @@ def _kind(layout: Layout, k: int, role: str | None) -> str | None:
 def _meanings(
     path: Path, layout: Layout, options: Options, findings: list[Finding]
 ) -> list[Meaning]:
-    """Return what each column means: by option, by name, by the program that wrote it."""
-    names = layout.names
+    """Return what each column means; without a header only the option `columns` tells."""
     if layout.header:
-        meanings = recognise_all(names, context=options.context)
-    else:
-        meanings = [Meaning() for _ in names]
-    for role, column in options.columns.items():
-        k = _column_number(path, names, role, column)
-        meanings = [
-            Meaning() if m.role == role or j == k else m for j, m in enumerate(meanings)
-        ]
-        unit = recognise_all([names[k]], context=options.context)[0].unit
-        fits = unit is not None and unit.quantity == ROLES[role].quantity
-        meanings[k] = Meaning(role, unit if fits else None)
-    meanings = _one_time(layout, meanings)
-    dialect = next(
-        (
-            (program, units)
-            for program, pattern, units in _DIALECTS
-            if layout.header and any(re.fullmatch(pattern, name) for name in names)
-        ),
-        ("", {}),
-    )
-    out = []
-    for name, meaning in zip(names, meanings, strict=True):
-        out.append(_with_unit(path, name, meaning, options, dialect, findings))
-    if not layout.header and not options.columns:
+        return meanings_of(path, layout.names, options, findings)
+    if not options.columns:
         findings.append(
             Finding(
                 kind="columns",
-                what=f"the file has no header, only {len(names)} columns of numbers",
+                what=f"the file has no header, only {len(layout.names)} columns of numbers",
                 fault=True,
                 file=str(path),
                 hint='say what they are with columns={"t": 0, "gyr_x": 1, ...}',
             )
         )
-    return out
+    return meanings_of(path, layout.names, options, findings)
 
 
 def _one_time(layout: Layout, meanings: Sequence[Meaning]) -> list[Meaning]:
@@ -207,83 +169,7 @@ def _one_time(layout: Layout, meanings: Sequence[Meaning]) -> list[Meaning]:
             chosen = k
     if chosen is None:
         chosen = next((k for k, m in enumerate(meanings) if m.role == "t"), None)
-    return [
-        Meaning() if m.role == "t" and k != chosen else m for k, m in enumerate(meanings)
-    ]
-
-
-def _column_number(path: Path, names: Sequence[str], role: str, column: str | int) -> int:
-    """Return the number of the column that the option `columns` names."""
-    if isinstance(column, int) or (column not in names and column.isdigit()):
-        k = int(column)
-        if 0 <= k < len(names):
-            return k
-        raise FormatError(
-            f"`columns` asks for column {k} as {role}, the file has columns 0 to {len(names) - 1}",
-            file=path,
-        )
-    if column in names:
-        return list(names).index(column)
-    raise FormatError(
-        f"`columns` asks for {column!r} as {role}, the file has {', '.join(names)}"
-        f"{_checks.nearest(column, names)}",
-        file=path,
-    )
-
-
-def _with_unit(
-    path: Path,
-    name: str,
-    meaning: Meaning,
-    options: Options,
-    dialect: tuple[str, dict[str, str]],
-    findings: list[Finding],
-) -> Meaning:
-    """Return the meaning with the unit that counts: the user's, the header's, the program's."""
-    role = meaning.role
-    if role is None:
-        return meaning
-    stated = options.unit_of(role)
-    if stated is not None:
-        if meaning.unit is not None and meaning.unit != stated:
-            what = f"{name!r} is read in {stated.symbol} as asked, though its name says "
-            findings.append(
-                Finding(kind="unit", what=what + meaning.unit.symbol, file=str(path))
-            )
-        return Meaning(role, stated)
-    if meaning.strange_unit is not None:
-        place = ROLES[role]
-        if place.group not in ("time", "gyr", "acc", "mag", "baro", "temperature"):
-            return Meaning()
-        findings.append(
-            Finding(
-                kind="unit",
-                what=f"{name!r} is in {meaning.strange_unit!r}, which is no unit of "
-                f"{place.quantity.replace('_', ' ')}",
-                fault=True,
-                file=str(path),
-                hint=_units_hint(place.group, units_of(place.quantity)[0].name),
-            )
-        )
-        return Meaning(role)
-    program, units = dialect
-    text = units.get(ROLES[role].group)
-    if meaning.unit is None and text is not None:
-        unit = parse_unit(text, ROLES[role].quantity)
-        findings.append(
-            Finding(
-                kind="unit",
-                what=f"{ROLES[role].group} is read in {unit.symbol}, as {program} writes it",
-                file=str(path),
-            )
-        )
-        return Meaning(role, unit)
-    return meaning
-
-
-def _units_hint(group: str, unit: str) -> str:
-    """Return the way out that names the option."""
-    return f'state the unit with --units {group}={unit} (units="{group}={unit}")'
+    return [Meaning() if m.role == "t" and k != chosen else m for k, m in enumerate(meanings)]
 
 
 # --- writing ----------------------------------------------------------------------------
@@ -349,9 +235,7 @@ def save(rec: Recording, path: Path, stream: IO[bytes]) -> None:
         for label, values in _cells(name, part):
             columns[label] = _spread(values, rows, len(t))
     suffixes = [suffix.lower() for suffix in path.suffixes]
-    options = csv.WriteOptions(
-        delimiter="\t" if ".tsv" in suffixes else ",", quoting_style="none"
-    )
+    options = csv.WriteOptions(delimiter="\t" if ".tsv" in suffixes else ",", quoting_style="none")
     table = pa.table(columns)
     if suffixes and suffixes[-1] == ".gz":
         # mtime 0: the same recording gives the same bytes
@@ -388,5 +272,3 @@ def _spread(values: Any, rows: Any, n: int) -> Any:
     spread[rows] = values
     empty[rows] = False
     return pa.array(spread, mask=empty)
-
-

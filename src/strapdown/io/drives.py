@@ -88,15 +88,14 @@ def _manifest(path: Path) -> dict[str, Any]:
     """Return the manifest, its list of files checked."""
     file = path / MANIFEST
     try:
-        manifest = json.loads(file.read_text(encoding="utf-8"))
+        manifest: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
     except OSError as error:
         raise unreadable(file, error) from None
     except ValueError as error:
         raise FormatError(f"must be JSON ({error})", file=file) from None
     files = manifest.get("files") if isinstance(manifest, dict) else None
     if not isinstance(files, dict) or not all(
-        isinstance(entry, dict) and isinstance(entry.get("path"), str)
-        for entry in files.values()
+        isinstance(entry, dict) and isinstance(entry.get("path"), str) for entry in files.values()
     ):
         raise FormatError('must list the files as "files": {"imu": {"path": ...}}', file=file)
     if "imu" not in files:

@@ -80,9 +80,7 @@ def load(path: Path, options: Options) -> RawLog:
         try:
             table = csv.load_table(file, replace(options, context=context), found)
         except FormatError as error:
-            found.append(
-                Finding(kind="empty", what=error.what, fault=True, file=str(file))
-            )
+            found.append(Finding(kind="empty", what=error.what, fault=True, file=str(file)))
             table = Table(file=str(file), columns=[])
         if any(c.role not in (None, "t") for c in table.columns) or context is not None:
             tables.append(table)
@@ -97,7 +95,8 @@ def load_files(
     files: Iterable[tuple[str, Path]], options: Options
 ) -> tuple[list[Table], list[Finding]]:
     """Return the tables of files whose sensors were named, ``imu`` among them."""
-    tables, findings = [], []
+    tables: list[Table] = []
+    findings: list[Finding] = []
     for sensor, file in files:
         context = sensor if sensor != "imu" else None
         table = csv.load_table(file, replace(options, context=context), findings)
@@ -177,7 +176,10 @@ def choose(tables: Sequence[Table], path: Path, findings: list[Finding]) -> list
             used |= fresh
         elif table.columns:
             findings.append(
-                Finding(kind="columns", what="is not used, another file holds its sensor",
-                        file=table.file)  # fmt: skip
+                Finding(
+                    kind="columns",
+                    what="is not used, another file holds its sensor",
+                    file=table.file,
+                )
             )
     return chosen

@@ -21,9 +21,9 @@ import numpy as np
 from strapdown._types import FloatArray
 from strapdown.errors import FormatError, InputError
 from strapdown.io._assemble import assemble
-from strapdown.io._headers import Meaning, recognise_all
+from strapdown.io._meaning import meanings_of
 from strapdown.io._options import Options
-from strapdown.io._raw import Column, RawLog, Table
+from strapdown.io._raw import Column, Finding, RawLog, Table
 from strapdown.io._text import unreadable
 from strapdown.recording import REFERENCE_STREAMS, STREAMS, Recording, Reference, Stream
 from strapdown.units import parse_unit
@@ -103,7 +103,9 @@ def header_of(file: Any, path: Path, kind: str) -> dict[str, Any] | None:
         )
     if found != kind:
         reader = {"solution": "io.read_solution", "recording": "io.read"}.get(found, "another")
-        raise FormatError(f"must hold a {kind}, it holds a {found}", file=path, hint=f"use {reader}")
+        raise FormatError(
+            f"must hold a {kind}, it holds a {found}", file=path, hint=f"use {reader}"
+        )
     return dict(header)
 
 
@@ -114,7 +116,7 @@ def load(path: Path, options: Options) -> RawLog:
     header = header_of(file, path, "recording")
     if header is None:
         raw.meta["name"] = path.stem
-        raw.tables.append(_foreign_table(file, path, options))
+        raw.tables.append(_foreign_table(file, path, options, raw.findings))
         return raw
     raw.meta.update(header["meta"])
     for name, t, fields in _streams(file, header, path):
@@ -201,22 +203,12 @@ def _numbers(table: Any, column: str) -> Any:
     return table.column(column).to_numpy()
 
 
-def _foreign_table(file: Any, path: Path, options: Options) -> Table:
+def _foreign_table(file: Any, path: Path, options: Options, findings: list[Finding]) -> Table:
     """Return the columns of a table that this package did not write."""
     import pyarrow as pa
 
     names = list(file.schema_arrow.names)
-    meanings = recognise_all(names, context=options.context)
-    for role, column in options.columns.items():
-        name = names[column] if isinstance(column, int) and column < len(names) else column
-        if name not in names:
-            raise FormatError(
-                f"`columns` asks for {column!r} as {role}, the file has {', '.join(names)}",
-                file=path,
-            )
-        k = names.index(str(name))
-        meanings = [Meaning() if m.role == role else m for m in meanings]
-        meanings[k] = Meaning(role, meanings[k].unit)
+    meanings = meanings_of(path, names, options, findings)
     columns: list[Column] = []
     times = 0
     for name, meaning in zip(names, meanings, strict=True):
@@ -241,8 +233,6 @@ def _foreign_table(file: Any, path: Path, options: Options) -> Table:
         except (pa.ArrowException, OSError, ValueError) as error:
             raise damaged(path, error) from None
         unit = parse_unit("ns") if dated else meaning.unit
-        if role is not None:
-            unit = options.unit_of(role) or unit
         columns.append(Column(name=name, values=values, role=role, unit=unit, empty=empty))
     if file.metadata.num_rows == 0:
         raise FormatError("the table has columns but no rows", file=path)
@@ -341,5 +331,3 @@ def as_json(header: Mapping[str, Any], path: Path) -> str:
         raise InputError(
             f"{path}: `meta` must hold text, numbers, lists and mappings only ({error})."
         ) from None
-
-

@@ -5,6 +5,7 @@ import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+from strapdown._checks import nearest
 from strapdown.errors import InputError, StrapdownError
 
 FAILED = 1
@@ -59,10 +60,9 @@ def verdict(error: BaseException) -> tuple[int, str]:
 def _usage(error: BaseException) -> str:
     """Return typer's complaint about the command line as one sentence."""
     text = str(error.format_message())  # type: ignore[attr-defined]
-    near = getattr(error, "possibilities", None)
-    if near:
-        options = " or ".join(repr(option) for option in sorted(near))
-        text = f"{getattr(error, 'message', text)}; did you mean {options}"
+    option, options = getattr(error, "option_name", ""), getattr(error, "possibilities", None)
+    if options:
+        text = f"{getattr(error, 'message', text)}{nearest(option, options)}"
     context = getattr(error, "ctx", None)
     command = context.command_path if context is not None else "strapdown"
     text = _one_line(text).rstrip(".?")

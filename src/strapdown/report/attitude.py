@@ -22,6 +22,7 @@ from strapdown.solution import Solution, Status
 from strapdown.units import DEG
 
 TURN_DEG = 360.0
+BUCKETS = 3000  # attitude is what one zooms into: twice the detail of other figures
 
 
 def aligned(sol: Solution) -> BoolArray:
@@ -106,7 +107,9 @@ def attitude_section(
     note = f"Attitude of the {whose}, relative to north, east, down; {_heading(sol)}"
     if errors is not None and errors.heading_removed and rpy_ref is not None:
         note += f" The reference is turned by {errors.heading_constant / DEG:.2f}° for the figure."
-    return Section(title="Attitude", intro=note, blocks=[plot(time_figure(panels))])
+    return Section(
+        title="Attitude", intro=note, blocks=[plot(time_figure(panels, buckets=BUCKETS))]
+    )
 
 
 def _heading(sol: Solution) -> str:

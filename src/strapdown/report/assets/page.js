@@ -41,9 +41,9 @@
   function ticks(plot, change) {
     const update = {};
     Object.keys(change).forEach((key) => {
-      const [name, rest] = key.split(".");
-      if (!name.startsWith("yaxis") || !quarters(plot, name)) return;
-      update[`${name}.tickmode`] = rest === "autorange" ? "linear" : "auto";
+      const found = /^(yaxis\d*)\.(range|autorange)/.exec(key);
+      if (!found || !quarters(plot, found[1])) return;
+      update[`${found[1]}.tickmode`] = found[2] === "autorange" ? "linear" : "auto";
     });
     if (Object.keys(update).length) Plotly.relayout(plot, update);
   }

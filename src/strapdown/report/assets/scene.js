@@ -64,7 +64,7 @@
     let elevation = 24 / DEG;
     let now = first;
     let running = false;
-    let stamp = 0;
+    let stamp = null;
 
     function at(series, row, part) {
       const a = series.subarray(4 * row, 4 * row + 4);
@@ -280,7 +280,8 @@
 
     function frame(time) {
       if (!running) return;
-      seek(now + ((time - stamp) / 1000) * Number(speed.value), true);
+      const passed = stamp === null ? 0 : (time - stamp) / 1000; // the first frame starts the clock
+      seek(now + passed * Number(speed.value), true);
       stamp = time;
       if (now >= last) setRunning(false); else requestAnimationFrame(frame);
     }
@@ -290,7 +291,7 @@
       play.textContent = on ? "Pause" : "Play";
       if (!on) return;
       if (now >= last) now = first;
-      stamp = performance.now();
+      stamp = null;
       requestAnimationFrame(frame);
     }
 

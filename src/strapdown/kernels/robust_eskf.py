@@ -1,0 +1,589 @@
+"""Robust error-state Kalman filter of attitude. Frames: n = NED, b = body.
+
+Every sample turns the attitude and adds to the sums of the open interval. About ten times a
+second the interval is closed: its sums propagate the covariance, and three measurements enter,
+one scalar at a time: the velocity, which stays bounded; at rest the rates, which are the
+gyro's bias; and the direction of the horizontal magnetic field.
+"""
+
+from math import atan2, cos, inf, isinf, sin, sqrt
+
+from strapdown.kernels import status as s
+from strapdown.kernels._jit import Mat, Vec, kernel
+from strapdown.kernels.memory import (
+    BA,
+    BG,
+    D_ACC,
+    D_MAG,
+    HEAD,
+    MAG,
+    P_DECLINATION,
+    P_GYR_RANGE,
+    P_HEAD,
+    SKIP,
+    START,
+    STATUS,
+    STD_ATT,
+    STD_BA,
+    STD_BG,
+    T,
+    V,
+    W_HEAD,
+    WIDEN,
+    DT,
+    Q,
+    begin,
+    load,
+    note_sigma,
+    post_mag,
+    set_status,
+    store,
+)
+from strapdown.kernels.quat import dcm, exp, from_two_vectors, log, mul, normalize, rotate
+from strapdown.kernels.robust_eskf_covariance import (
+    C_DT,
+    DV,
+    EBA,
+    EBG,
+    EMG,
+    INTERVAL,
+    LAG,
+    PHI,
+    TAU,
+    THETA,
+    VEL,
+    N,
+    enter,
+    forget,
+    propagate,
+)
+
+# --- p -----------------------------------------------------------------------------------
+P_GYR_NOISE = P_HEAD
+P_GYR_RATE_NOISE = P_HEAD + 1
+P_GYR_BIAS_WALK = P_HEAD + 2
+P_GYR_BIAS_STD = P_HEAD + 3
+P_GYR_SCALE_STD = P_HEAD + 4
+P_ACC_NOISE = P_HEAD + 5
+P_ACC_BIAS_STD = P_HEAD + 6
+P_VELOCITY_STD = P_HEAD + 7
+P_VELOCITY_TIME = P_HEAD + 8
+P_MAG_STD = P_HEAD + 9
+P_MAG_TIME = P_HEAD + 10
+P_MAG_WALK = P_HEAD + 11
+P_MAG_DELAY_STD = P_HEAD + 12
+P_TAILS = P_HEAD + 13
+P_REST_GYR = P_HEAD + 14
+P_REST_ACC = P_HEAD + 15
+P_REST_TIME = P_HEAD + 16
+P_RATE_WALK = P_HEAD + 17
+P_INTERVAL = P_HEAD + 18
+P_LATENCY = P_HEAD + 19
+P_TIMING_STD = P_HEAD + 20
+P_FIELD_STD = P_HEAD + 21
+P_GRAVITY = P_HEAD + 22
+P_SIZE = P_HEAD + 23
+
+# --- x -----------------------------------------------------------------------------------
+ATT = HEAD  # q_nb before the latency is added: 4
+MG = HEAD + 4  # scale and misalignment of the gyro: 9
+DELAY = HEAD + 13  # of the magnetometer [s]
+OPEN = HEAD + 14  # sums of the open interval
+FIELD = OPEN + INTERVAL  # field in n (3), turning rate of the field (2), count
+EXTRA = FIELD + 6  # variances that the interval adds besides the noise: angle, velocity
+SINCE_MAG = EXTRA + 2  # [s]
+USUAL = SINCE_MAG + 1  # usual field: horizontal, down, variance of both
+GYR_MEAN = USUAL + 3  # low-passed rate and specific force
+ACC_MEAN = GYR_MEAN + 3
+QUIET = ACC_MEAN + 3  # how long both have been near their mean [s]
+DRIFT = QUIET + 1  # low-passed velocity over its deviation: 3
+FLAGS = DRIFT + 3  # status bits of the last interval
+ACC_HELD = FLAGS + 1  # last specific force, for sensors slower than the gyro: 3
+HAS_HELD = ACC_HELD + 3
+STARTED = HAS_HELD + 1
+X_SIZE = STARTED + 1
+
+# --- w: scratch, and the record of a closed interval that the smoother reads ---------------------
+ERROR = W_HEAD  # error state of the open update
+SCRATCH = ERROR + N
+RECORD = SCRATCH + 12 * N
+R_CLOSED = RECORD  # 1 when this sample closed an interval
+R_RESET = RECORD + 1  # 1 if attitude and velocity were forgotten in it, 2 if heading was
+R_RESET_T = RECORD + 2  # and when
+R_TURN = RECORD + 3  # turn about down at that reset
+R_COUNT = RECORD + 4  # measurements
+R_STEP = RECORD + 5  # corrections of attitude and gyro bias
+R_SUMS = R_STEP + 6
+R_ROWS = R_SUMS + INTERVAL  # rows of attitude and gyro bias of P after the updates
+R_MEASURED = R_ROWS + 6 * N  # each: element, h_lag, innovation, its variance, g
+MEASURED = N + 4
+W_SIZE = R_MEASURED + 7 * MEASURED
+RECORD_SIZE = W_SIZE - RECORD
+
+LOW_PASS = 0.5  # time constant of the means that show rest [s]
+MIN_RATE = 0.035  # a mean rate below 2 deg/s may be rest [rad/s]
+REST_SPEED = 0.01  # speed at rest [m/s]
+REST_RATE = 3.5e-4  # mean rate at rest, bias apart [rad/s]
+TILT_STD = 0.1  # of an attitude levelled from one sample [rad]
+HEADING_STD = 0.3  # of a heading from one sample of the field [rad]
+LOST = 10.0  # deviations of the mean velocity that no motion explains
+DISTURBED = 10.0  # deviations of the field that the flag tells
+
+
+@kernel
+def heavy_tail(tails: float, ratio: float) -> float:
+    """Factor on a variance so that a normal update follows Student's t.
+
+    `ratio` is the innovation squared over its variance, `tails` the degrees of freedom.
+    """
+    return max(1.0, (tails + ratio) / (tails + 1.0))
+
+
+@kernel
+def _measure(P: Mat, w: Vec, i: int, h_lag: float, z: float, r: float) -> None:
+    """Enter a scalar into covariance and error state, and record it for the smoother."""
+    m = R_MEASURED + int(w[R_COUNT]) * MEASURED
+    innovation = z - w[ERROR + i] - h_lag * w[ERROR + LAG]
+    variance = enter(P, i, h_lag, r, w, m + 4)
+    k = innovation / sqrt(variance)
+    for j in range(N):
+        w[ERROR + j] += k * w[m + 4 + j]
+    w[m] = float(i)
+    w[m + 1] = h_lag
+    w[m + 2] = innovation
+    w[m + 3] = variance
+    w[R_COUNT] += 1.0
+
+
+@kernel
+def _clear(x: Vec) -> None:
+    """Open a new interval."""
+    for i in range(INTERVAL):
+        x[OPEN + i] = 0.0
+    for i in range(6):
+        x[FIELD + i] = 0.0
+    x[EXTRA] = 0.0
+    x[EXTRA + 1] = 0.0
+
+
+@kernel
+def _forget_motion(x: Vec, P: Mat, p: Vec, w: Vec, ax: float, ay: float, az: float) -> None:
+    """Velocity and tilt are unknown again; the open interval is dropped."""
+    excess = sqrt(ax * ax + ay * ay + az * az) / p[P_GRAVITY] - 1.0
+    for i in range(3):
+        forget(P, PHI + i, TILT_STD * TILT_STD + excess * excess)
+        forget(P, VEL + i, p[P_VELOCITY_STD] * p[P_VELOCITY_STD])
+        x[V + i] = 0.0
+        x[DRIFT + i] = 0.0
+    x[QUIET] = 0.0
+    _clear(x)
+    w[R_RESET] = 1.0
+    w[R_RESET_T] = x[T]
+
+
+# fmt: off
+@kernel
+def _level(
+    x: Vec, P: Mat, p: Vec, w: Vec, has_acc: bool, ax: float, ay: float, az: float
+) -> None:
+    """Turn the attitude the short way until the specific force, if any, points up."""
+    # fmt: on
+    heading = P[PHI + 2, PHI + 2]
+    if has_acc:
+        q0, q1, q2, q3 = x[ATT], x[ATT + 1], x[ATT + 2], x[ATT + 3]
+        fx, fy, fz = rotate(q0, q1, q2, q3, ax, ay, az)
+        c0, c1, c2, c3 = from_two_vectors(fx, fy, fz, 0.0, 0.0, -1.0)
+        q0, q1, q2, q3 = mul(c0, c1, c2, c3, q0, q1, q2, q3)
+        x[ATT], x[ATT + 1], x[ATT + 2], x[ATT + 3] = normalize(q0, q1, q2, q3)
+        _forget_motion(x, P, p, w, ax, ay, az)
+    else:
+        _forget_motion(x, P, p, w, 0.0, 0.0, 0.0)
+    P[PHI + 2, PHI + 2] = heading
+
+
+@kernel
+def _velocity(x: Vec, P: Mat, p: Vec, w: Vec, rest: bool) -> None:
+    """Velocity is zero: at rest exactly, else within its bound, with heavy tails."""
+    tau = x[OPEN + TAU]
+    bound = p[P_VELOCITY_STD] * p[P_VELOCITY_STD]
+    fade = min(1.0, 0.5 * tau)
+    for i in range(3):
+        v = x[V + i]
+        expected = P[VEL + i, VEL + i] + bound
+        x[DRIFT + i] += fade * (v / sqrt(expected) - x[DRIFT + i])
+        r = REST_SPEED * REST_SPEED
+        if not rest:  # one look per interval at something that changes over `velocity_time`
+            r = bound * max(1.0, 2.0 * p[P_VELOCITY_TIME] / tau)
+            r *= heavy_tail(p[P_TAILS], v * v / expected)
+        note_sigma(w, D_ACC, i, -v, P[VEL + i, VEL + i] + r)
+        _measure(P, w, VEL + i, 0.0, -v, r)
+    w[D_ACC + 6] = s.ACCEPTED
+
+
+@kernel
+def _rest(x: Vec, P: Mat, p: Vec, w: Vec) -> None:
+    """At rest the mean rate is the gyro's bias; heavy tails, lest slow turning pass for it."""
+    r0 = REST_RATE * REST_RATE
+    for i in range(3):
+        d = x[GYR_MEAN + i] - x[BG + i]
+        r = r0 * max(1.0, 2.0 * LOW_PASS / x[OPEN + TAU])
+        r *= heavy_tail(p[P_TAILS], d * d / (P[EBG + i, EBG + i] + r0))
+        _measure(P, w, EBG + i, 0.0, d, r)
+
+
+@kernel
+def _heading(x: Vec, P: Mat, p: Vec, w: Vec) -> int:
+    """Heading from the mean horizontal field of the interval; returns status bits.
+
+    How far the field is off its usual horizontal and vertical strength tells how large the
+    disturbance is, and so how much the third component, its direction, may be off.
+    """
+    k = 1.0 / x[FIELD + 5]
+    turn_n, turn_e = k * x[FIELD + 3], k * x[FIELD + 4]
+    mn = k * x[FIELD] - x[DELAY] * turn_n
+    me = k * x[FIELD + 1] - x[DELAY] * turn_e
+    md = k * x[FIELD + 2]
+    h2 = mn * mn + me * me
+    if not h2 > 0.0:
+        return s.MAG_INVALID
+    if x[USUAL + 2] == 0.0:  # the first field is the usual one
+        x[USUAL] = sqrt(h2)
+        x[USUAL + 1] = md
+        x[USUAL + 2] = 400.0 * p[P_MAG_STD] * p[P_MAG_STD]
+    dh = sqrt(h2) - x[USUAL]
+    dd = md - x[USUAL + 1]
+    off2 = dh * dh + dd * dd
+    usual = p[P_MAG_STD] * p[P_MAG_STD]
+    tails = p[P_TAILS]
+    variance = (tails * usual + off2) / (tails + 2.0)
+    z = p[P_DECLINATION] - atan2(me, mn)
+    if z > 3.141592653589793:
+        z -= 6.283185307179586
+    elif z < -3.141592653589793:
+        z += 6.283185307179586
+    r = variance / (x[USUAL] * x[USUAL])
+    d = z - w[ERROR + PHI + 2]
+    r *= heavy_tail(tails + 2.0, d * d / (P[PHI + 2, PHI + 2] + r))
+    # a disturbance lasts: looks that are closer than it tell the same
+    lasting = max(1.0, 2.0 * p[P_MAG_TIME] / x[SINCE_MAG])
+    note_sigma(w, D_MAG, 0, dh, variance)
+    note_sigma(w, D_MAG, 1, d * x[USUAL], (P[PHI + 2, PHI + 2] + r) * x[USUAL] * x[USUAL])
+    note_sigma(w, D_MAG, 2, dd, variance)
+    w[D_MAG + 6] = s.ACCEPTED
+    # with more delay than assumed the field stood back by its turning
+    h_lag = (turn_n * me - turn_e * mn) / h2
+    _measure(P, w, PHI + 2, h_lag, z, r * lasting)
+    x[USUAL + 2] += p[P_MAG_WALK] * p[P_MAG_WALK] * x[SINCE_MAG]
+    gain = x[USUAL + 2] / (x[USUAL + 2] + variance * lasting)
+    x[USUAL] += gain * dh
+    x[USUAL + 1] += gain * dd
+    x[USUAL + 2] *= 1.0 - gain
+    x[SINCE_MAG] = 0.0
+    if off2 > DISTURBED * DISTURBED * usual:
+        w[D_MAG + 6] = s.REJECTED_DISTURBED
+        return s.MAG_DISTURBED
+    return 0
+
+
+@kernel
+def _add_noise(x: Vec, P: Mat, p: Vec) -> None:
+    """Process noise of the interval."""
+    tau = x[OPEN + TAU]
+    tx, ty, tz = x[OPEN + THETA], x[OPEN + THETA + 1], x[OPEN + THETA + 2]
+    rate2 = (tx * tx + ty * ty + tz * tz) / (tau * tau)
+    phi = p[P_GYR_NOISE] * p[P_GYR_NOISE] + p[P_GYR_RATE_NOISE] * p[P_GYR_RATE_NOISE] * rate2
+    vel = p[P_ACC_NOISE] * p[P_ACC_NOISE]
+    bias = p[P_GYR_BIAS_WALK] * p[P_GYR_BIAS_WALK]
+    # constants may change by their own size within hours: their variance never reaches zero
+    acc_bias = 1e-4 * p[P_ACC_BIAS_STD] * p[P_ACC_BIAS_STD]
+    scale = 1e-6 * p[P_GYR_SCALE_STD] * p[P_GYR_SCALE_STD]
+    delay = 1e-6 * p[P_MAG_DELAY_STD] * p[P_MAG_DELAY_STD]
+    for i in range(3):
+        P[PHI + i, PHI + i] += phi * tau + x[EXTRA]
+        P[VEL + i, VEL + i] += vel * tau + x[EXTRA + 1]
+        P[EBG + i, EBG + i] += bias * tau
+        P[EBA + i, EBA + i] += acc_bias * tau
+    for i in range(9):
+        P[EMG + i, EMG + i] += scale * tau
+    P[LAG, LAG] += delay * tau
+
+
+@kernel
+def _close(x: Vec, P: Mat, p: Vec, w: Vec) -> None:
+    """Propagate over the interval, enter the measurements, correct the estimate."""
+    tau = x[OPEN + TAU]
+    for i in range(INTERVAL):
+        w[R_SUMS + i] = x[OPEN + i]
+    propagate(P, x, OPEN, w, SCRATCH)
+    _add_noise(x, P, p)
+    for i in range(N):
+        w[ERROR + i] = 0.0
+    w[R_COUNT] = 0.0
+    w[R_CLOSED] = 1.0
+    bits = 0
+    rest = x[QUIET] >= p[P_REST_TIME]
+    _velocity(x, P, p, w, rest)
+    if rest:
+        bits |= s.REST
+        _rest(x, P, p, w)
+    x[SINCE_MAG] += tau
+    if x[FIELD + 5] > 0.0:
+        bits |= _heading(x, P, p, w)
+    x[FLAGS] = float(bits)
+
+    c0, c1, c2, c3 = exp(w[ERROR], w[ERROR + 1], w[ERROR + 2])
+    q0, q1, q2, q3 = mul(c0, c1, c2, c3, x[ATT], x[ATT + 1], x[ATT + 2], x[ATT + 3])
+    x[ATT], x[ATT + 1], x[ATT + 2], x[ATT + 3] = normalize(q0, q1, q2, q3)
+    for i in range(3):
+        x[V + i] += w[ERROR + VEL + i]
+        x[BG + i] += w[ERROR + EBG + i]
+        x[BA + i] += w[ERROR + EBA + i]
+        x[STD_BG + i] = sqrt(P[EBG + i, EBG + i])
+        x[STD_BA + i] = sqrt(P[EBA + i, EBA + i])
+        w[R_STEP + i] = w[ERROR + PHI + i]
+        w[R_STEP + 3 + i] = w[ERROR + EBG + i]
+    for i in range(9):
+        x[MG + i] += w[ERROR + EMG + i]
+    x[DELAY] += w[ERROR + LAG]
+    for j in range(N):
+        for i in range(3):
+            w[R_ROWS + i * N + j] = P[PHI + i, j]
+            w[R_ROWS + (3 + i) * N + j] = P[EBG + i, j]
+    _clear(x)
+
+
+@kernel
+def init(x: Vec, P: Mat, p: Vec) -> None:
+    """Write what is known of the errors before the first sample."""
+    for i in range(N):
+        for j in range(N):
+            P[i, j] = 0.0
+    for i in range(3):
+        P[PHI + i, PHI + i] = TILT_STD * TILT_STD
+        P[VEL + i, VEL + i] = p[P_VELOCITY_STD] * p[P_VELOCITY_STD]
+        P[EBG + i, EBG + i] = p[P_GYR_BIAS_STD] * p[P_GYR_BIAS_STD]
+        P[EBA + i, EBA + i] = p[P_ACC_BIAS_STD] * p[P_ACC_BIAS_STD]
+        x[STD_BG + i] = p[P_GYR_BIAS_STD]
+        x[STD_BA + i] = p[P_ACC_BIAS_STD]
+    for i in range(9):
+        P[EMG + i, EMG + i] = p[P_GYR_SCALE_STD] * p[P_GYR_SCALE_STD]
+    P[LAG, LAG] = p[P_MAG_DELAY_STD] * p[P_MAG_DELAY_STD]
+
+
+# fmt: off
+@kernel
+def _begin_interval(
+    x: Vec, P: Mat, p: Vec, w: Vec, has_acc: bool, has_mag: bool,
+    gx: float, gy: float, gz: float, ax: float, ay: float, az: float,
+) -> None:
+    """Take over the attitude that `begin` has just found, with its uncertainty."""
+    # fmt: on
+    q0, q1, q2, q3 = x[Q], x[Q + 1], x[Q + 2], x[Q + 3]
+    if x[STARTED] == 0.0:
+        x[STARTED] = 1.0
+        if has_acc:
+            _forget_motion(x, P, p, w, ax, ay, az)
+        else:
+            _forget_motion(x, P, p, w, 0.0, 0.0, p[P_GRAVITY])
+        heading = HEADING_STD if has_mag else 0.0  # without a field heading is arbitrary
+        P[PHI + 2, PHI + 2] = heading * heading
+        x[GYR_MEAN], x[GYR_MEAN + 1], x[GYR_MEAN + 2] = gx, gy, gz
+        x[ACC_MEAN], x[ACC_MEAN + 1], x[ACC_MEAN + 2] = ax, ay, az
+    else:  # the first field came: the picture so far turns about down
+        c0, c1, c2, c3 = mul(q0, q1, q2, q3, x[ATT], -x[ATT + 1], -x[ATT + 2], -x[ATT + 3])
+        c1, c2, c3 = log(c0, c1, c2, c3)
+        x[V], x[V + 1] = (
+            cos(c3) * x[V] - sin(c3) * x[V + 1],
+            sin(c3) * x[V] + cos(c3) * x[V + 1],
+        )
+        forget(P, PHI + 2, HEADING_STD * HEADING_STD)
+        _clear(x)
+        w[R_RESET] = max(2.0, w[R_RESET])
+        w[R_RESET_T] = x[T]
+        w[R_TURN] += c3
+    x[ATT], x[ATT + 1], x[ATT + 2], x[ATT + 3] = q0, q1, q2, q3
+
+
+# fmt: off
+@kernel
+def _note_rest(
+    x: Vec, p: Vec, dt: float, gx: float, gy: float, gz: float, has_acc: bool,
+    ax: float, ay: float, az: float,
+) -> None:
+    """How long both sensors have stayed near their mean, with a mean rate that may be a bias."""
+    # fmt: on
+    k = dt / (LOW_PASS + dt)
+    dx, dy, dz = gx - x[GYR_MEAN], gy - x[GYR_MEAN + 1], gz - x[GYR_MEAN + 2]
+    x[GYR_MEAN] += k * dx
+    x[GYR_MEAN + 1] += k * dy
+    x[GYR_MEAN + 2] += k * dz
+    quiet = dx * dx + dy * dy + dz * dz < p[P_REST_GYR] * p[P_REST_GYR]
+    if has_acc:
+        dx, dy, dz = ax - x[ACC_MEAN], ay - x[ACC_MEAN + 1], az - x[ACC_MEAN + 2]
+        x[ACC_MEAN] += k * dx
+        x[ACC_MEAN + 1] += k * dy
+        x[ACC_MEAN + 2] += k * dz
+        quiet = quiet and dx * dx + dy * dy + dz * dz < p[P_REST_ACC] * p[P_REST_ACC]
+    limit = MIN_RATE + 4.0 * max(x[STD_BG], max(x[STD_BG + 1], x[STD_BG + 2]))
+    dx, dy, dz = x[GYR_MEAN] - x[BG], x[GYR_MEAN + 1] - x[BG + 1], x[GYR_MEAN + 2] - x[BG + 2]
+    if quiet and abs(dx) < limit and abs(dy) < limit and abs(dz) < limit:
+        x[QUIET] += dt
+    else:
+        x[QUIET] = 0.0
+
+
+# fmt: off
+@kernel
+def _publish(
+    x: Vec, P: Mat, p: Vec, omega_n: float, omega_e: float,
+    rx: float, ry: float, rz: float,
+) -> None:
+    """Attitude at the time of the sample plus the latency, and its deviations.
+
+    `omega_n` and `omega_e` turn an unknown shift in time into tilt; ``(rx, ry, rz)`` is the
+    rate in b.
+    """
+    # fmt: on
+    q0, q1, q2, q3 = x[ATT], x[ATT + 1], x[ATT + 2], x[ATT + 3]
+    k = p[P_LATENCY]
+    if k != 0.0:
+        e0, e1, e2, e3 = exp(k * rx, k * ry, k * rz)
+        q0, q1, q2, q3 = mul(q0, q1, q2, q3, e0, e1, e2, e3)
+    x[Q], x[Q + 1], x[Q + 2], x[Q + 3] = q0, q1, q2, q3
+    k = p[P_TIMING_STD] * p[P_TIMING_STD]
+    x[STD_ATT] = sqrt(P[PHI, PHI] + k * omega_n * omega_n)
+    x[STD_ATT + 1] = sqrt(P[PHI + 1, PHI + 1] + k * omega_e * omega_e)
+    k = p[P_FIELD_STD] * p[P_FIELD_STD] if x[USUAL + 2] > 0.0 else 0.0
+    x[STD_ATT + 2] = sqrt(P[PHI + 2, PHI + 2] + k)
+
+
+# fmt: off
+@kernel
+def step(
+    x: Vec, P: Mat, p: Vec, w: Vec, t: float,
+    gx: float, gy: float, gz: float,
+    ax: float, ay: float, az: float,
+) -> None:
+    """Advance by one sample."""
+    # fmt: on
+    if x[STARTED] > 0.0:  # without the latency
+        x[Q], x[Q + 1], x[Q + 2], x[Q + 3] = x[ATT], x[ATT + 1], x[ATT + 2], x[ATT + 3]
+    before = x[T]
+    todo, dt, wx, wy, wz, has_acc, has_mag = begin(x, p, w, t, gx, gy, gz, ax, ay, az)
+    if todo == SKIP:
+        if x[STARTED] > 0.0:
+            _publish(x, P, p, 0.0, 0.0, 0.0, 0.0, 0.0)
+        return
+    held = isinf(ax) and x[HAS_HELD] > 0.0  # no sample, as against a bad one
+    if has_acc:
+        x[ACC_HELD], x[ACC_HELD + 1], x[ACC_HELD + 2] = ax, ay, az
+        x[HAS_HELD] = 1.0
+    else:
+        ax, ay, az = x[ACC_HELD], x[ACC_HELD + 1], x[ACC_HELD + 2]
+    if x[STARTED] == 0.0:
+        _begin_interval(x, P, p, w, has_acc, has_mag, gx, gy, gz, ax, ay, az)
+        before = t
+        dt = 0.0
+    elif todo == START:
+        _begin_interval(x, P, p, w, has_acc, has_mag, gx, gy, gz, ax, ay, az)
+    if todo == WIDEN:
+        _level(x, P, p, w, has_acc, ax, ay, az)
+        k = p[P_RATE_WALK]
+        P[PHI + 2, PHI + 2] = min(1.0, P[PHI + 2, PHI + 2] + k * k * dt * dt * dt / 12.0)
+        dt = 0.0
+
+    # attitude: scale and misalignment are those of the rate less its bias
+    rx, ry, rz = wx - x[BG], wy - x[BG + 1], wz - x[BG + 2]
+    dx = rx + x[MG] * rx + x[MG + 1] * ry + x[MG + 2] * rz
+    dy = ry + x[MG + 3] * rx + x[MG + 4] * ry + x[MG + 5] * rz
+    dz = rz + x[MG + 6] * rx + x[MG + 7] * ry + x[MG + 8] * rz
+    e0, e1, e2, e3 = exp(dt * dx, dt * dy, dt * dz)
+    q0, q1, q2, q3 = mul(x[ATT], x[ATT + 1], x[ATT + 2], x[ATT + 3], e0, e1, e2, e3)
+    k = 1.5 - 0.5 * (q0 * q0 + q1 * q1 + q2 * q2 + q3 * q3)  # 1 / norm, which is 1 to round-off
+    q0, q1, q2, q3 = k * q0, k * q1, k * q2, k * q3
+    x[ATT], x[ATT + 1], x[ATT + 2], x[ATT + 3] = q0, q1, q2, q3
+    c11, c12, c13, c21, c22, c23, c31, c32, c33 = dcm(q0, q1, q2, q3)
+    omega_n = c11 * dx + c12 * dy + c13 * dz
+    omega_e = c21 * dx + c22 * dy + c23 * dz
+
+    # specific force; unknown it is taken to be gravity's, with much noise
+    fx, fy, fz = 0.0, 0.0, -p[P_GRAVITY]
+    if has_acc or held:
+        bx, by, bz = ax - x[BA], ay - x[BA + 1], az - x[BA + 2]
+        fx = c11 * bx + c12 * by + c13 * bz
+        fy = c21 * bx + c22 * by + c23 * bz
+        fz = c31 * bx + c32 * by + c33 * bz
+    else:
+        x[EXTRA + 1] += dt
+    x[OPEN + C_DT] += dt * c11
+    x[OPEN + C_DT + 1] += dt * c12
+    x[OPEN + C_DT + 2] += dt * c13
+    x[OPEN + C_DT + 3] += dt * c21
+    x[OPEN + C_DT + 4] += dt * c22
+    x[OPEN + C_DT + 5] += dt * c23
+    x[OPEN + C_DT + 6] += dt * c31
+    x[OPEN + C_DT + 7] += dt * c32
+    x[OPEN + C_DT + 8] += dt * c33
+    x[OPEN + THETA] += dt * dx
+    x[OPEN + THETA + 1] += dt * dy
+    x[OPEN + THETA + 2] += dt * dz
+    x[OPEN + DV] += dt * fx
+    x[OPEN + DV + 1] += dt * fy
+    x[OPEN + DV + 2] += dt * fz
+    x[OPEN + TAU] += dt
+    x[V] += dt * fx
+    x[V + 1] += dt * fy
+    x[V + 2] += dt * (fz + p[P_GRAVITY])
+
+    missing = dt - x[DT]
+    if missing > 0.5 * x[DT]:  # variance of a random walk of the rate between its two ends
+        x[EXTRA] += p[P_RATE_WALK] * p[P_RATE_WALK] * missing * missing * missing / 12.0
+    if max(abs(gx), max(abs(gy), abs(gz))) >= p[P_GYR_RANGE]:  # the rate may be much higher
+        x[EXTRA] += dt * dt * (gx * gx + gy * gy + gz * gz)
+
+    if has_mag:
+        mx, my, mz = x[MAG + 1], x[MAG + 2], x[MAG + 3]
+        omega_d = c31 * dx + c32 * dy + c33 * dz
+        hx = c11 * mx + c12 * my + c13 * mz
+        hy = c21 * mx + c22 * my + c23 * mz
+        hz = c31 * mx + c32 * my + c33 * mz
+        x[FIELD] += hx
+        x[FIELD + 1] += hy
+        x[FIELD + 2] += hz
+        x[FIELD + 3] += omega_e * hz - omega_d * hy
+        x[FIELD + 4] += omega_d * hx - omega_n * hz
+        x[FIELD + 5] += 1.0
+
+    _note_rest(x, p, t - before, gx, gy, gz, has_acc, ax, ay, az)
+    if x[OPEN + TAU] >= p[P_INTERVAL]:
+        _close(x, P, p, w)
+        k = x[DRIFT] * x[DRIFT] + x[DRIFT + 1] * x[DRIFT + 1] + x[DRIFT + 2] * x[DRIFT + 2]
+        if k > LOST * LOST and has_acc:
+            _level(x, P, p, w, True, ax, ay, az)
+    set_status(x, int(x[FLAGS]))
+    _publish(x, P, p, omega_n, omega_e, dx, dy, dz)
+
+
+# fmt: off
+@kernel
+def run(
+    x: Vec, P: Mat, p: Vec, w: Vec,
+    t: Vec, gyr: Mat, acc: Mat, t_mag: Vec, mag: Mat, events: Mat,
+    out: Mat, out_diag: Mat,
+) -> None:
+    """Loop of `step` over a recording."""
+    # fmt: on
+    j = 0
+    for k in range(t.shape[0]):
+        j = load(x, t[k], j, t_mag, mag)
+        step(x, P, p, w, t[k], gyr[k, 0], gyr[k, 1], gyr[k, 2], acc[k, 0], acc[k, 1], acc[k, 2])
+        store(x, w, k, out, out_diag)
+    if t.shape[0] > 0:
+        load(x, inf, j, t_mag, mag)
+
+
+@kernel
+def update(x: Vec, P: Mat, p: Vec, w: Vec, t: float, gyr: Vec, acc: Vec, mag: Vec) -> None:
+    """One `step` from vectors, for real-time code."""
+    post_mag(x, mag)
+    step(x, P, p, w, t, gyr[0], gyr[1], gyr[2], acc[0], acc[1], acc[2])

@@ -9,7 +9,7 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet install
 export STRAPDOWN_CACHE_DIR ?= $(CURDIR)/.numba_cache
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test check bench docs picture clean
+.PHONY: help demo test check bench tables docs picture clean
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "make %-8s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -30,7 +30,11 @@ check: $(STAMPS)/dev  ## format, lint, docstrings, types, layers, spelling, kern
 	! git grep -nIE '/(work|root|home|Users)/[a-z]'
 
 bench: $(STAMPS)/bench  ## speed, side by side with vqf and imufusion
-	$(BIN)/python -m pytest benchmarks -q -s
+	STRAPDOWN_SPEED_TABLE=docs/tables/speed.md $(BIN)/python -m pytest benchmarks -q \
+	  --benchmark-disable-gc --benchmark-columns=median,iqr,rounds
+
+tables: $(STAMPS)/core  ## accuracy on the real recordings, for the docs
+	$(BIN)/python docs/tables/make_broad.py
 
 docs: $(STAMPS)/docs  ## the documentation, warnings are errors
 	$(BIN)/python -m sphinx -W --keep-going -q -b html docs docs/_build/html

@@ -117,6 +117,7 @@ def _parts_of(
     present = {group: _present(columns.values()) for group, columns in groups.items()}
     rows = _rows_by_group(present, len(t))
     parts = []
+    orders: dict[int | None, Any] = {}  # sensors that share rows share their times
     for group, columns in groups.items():
         chosen = rows[group]
         if chosen is not None and not chosen.any():
@@ -129,22 +130,39 @@ def _parts_of(
         _check_units(group, columns, table, findings)
         if group in NEEDED and _all_nan(columns, NEEDED[group], numbers, group, table, findings):
             continue
-        times = t if numbers is None else t[numbers]
-        order = advancing(
-            times,
-            repair=options.repair_time,
-            file=table.file,
-            stream=group,
-            line=lambda k, numbers=numbers: table.line(  # type: ignore[misc]
-                k if numbers is None else int(numbers[k])
-            ),
-            findings=findings,
-        )
-        if order is not None:
-            times = times[order]
-            numbers = order if numbers is None else numbers[order]
+        shared = None if numbers is None else id(chosen)
+        if shared not in orders or group == "gnss":
+            orders[shared] = _times(table, t, numbers, group, options, findings)
+        times, numbers = orders[shared]
         parts.append(Part(group=group, table=table, t=times, rows=numbers, columns=columns))
     return parts
+
+
+def _times(
+    table: Table,
+    t: FloatArray,
+    numbers: NDArray[np.int64] | None,
+    group: str,
+    options: Options,
+    findings: list[Finding],
+) -> tuple[FloatArray, NDArray[np.int64] | None]:
+    """Return times and rows of a sensor, repaired where that was asked for."""
+    times = t if numbers is None else t[numbers]
+
+    def line(row: int) -> int:
+        return table.line(row if numbers is None else int(numbers[row]))
+
+    order = advancing(
+        times,
+        repair=options.repair_time,
+        file=table.file,
+        stream="imu" if group in IMU_GROUPS else group,
+        line=line,
+        findings=findings,
+    )
+    if order is None:
+        return times, numbers
+    return times[order], order if numbers is None else numbers[order]
 
 
 def _present(columns: Iterable[Column]) -> BoolArray | None:

@@ -8,7 +8,7 @@ import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import BinaryIO, Final, cast
+from typing import Any, BinaryIO, Final, cast
 
 from strapdown.errors import FormatError
 from strapdown.units import parse_unit
@@ -26,20 +26,31 @@ CLOCK_TIME: Final = re.compile(r"^\d\d:\d\d:\d\d(\.\d{1,9})?$")
 
 
 class _Transcoded(io.RawIOBase):
-    """UTF-16 text as UTF-8 bytes, and lone carriage returns as line feeds."""
+    """Text of another encoding as UTF-8 bytes, lone carriage returns as line feeds."""
 
     def __init__(self, inner: BinaryIO, encoding: str, carriage_returns: bool) -> None:
         self._inner = inner
         self._decoder = codecs.getincrementaldecoder(encoding)("replace")
         self._carriage_returns = carriage_returns
+        self._pending = b""
 
-    def read(self, size: int = -1) -> bytes:
-        """Return about `size` bytes, none at the end."""
-        block = self._inner.read(size)
-        text = self._decoder.decode(block, final=not block)
-        if self._carriage_returns:
-            text = text.replace("\r", "\n")
-        return text.encode()
+    def readable(self) -> bool:
+        """Tell that it can be read."""
+        return True
+
+    def readinto(self, buffer: Any) -> int:
+        """Fill a buffer; return the number of bytes, 0 at the end."""
+        while not self._pending:
+            block = self._inner.read(HEAD)
+            text = self._decoder.decode(block, final=not block)
+            if self._carriage_returns:
+                text = text.replace("\r", "\n")
+            self._pending = text.encode()
+            if not block:
+                break
+        part, self._pending = self._pending[: len(buffer)], self._pending[len(buffer) :]
+        buffer[: len(part)] = part
+        return len(part)
 
     def close(self) -> None:
         """Close the file below."""
@@ -55,25 +66,26 @@ def open_text(path: Path) -> BinaryIO:
     FormatError
         If there is no such file, it may not be read, or it is damaged.
     """
+    stream: BinaryIO | None = None
     try:
-        stream: BinaryIO = path.open("rb")
-        magic = stream.read(2)
-        stream.seek(0)
-        if magic == GZIP_MAGIC:
-            stream = cast(BinaryIO, gzip.GzipFile(fileobj=stream))
+        with path.open("rb") as packed:
+            magic = packed.read(2)
+        stream = cast(BinaryIO, gzip.open(path)) if magic == GZIP_MAGIC else path.open("rb")
         head = stream.read(HEAD)
         stream.seek(0)
     except (OSError, EOFError, zlib.error) as error:
+        if stream is not None:
+            stream.close()
         raise unreadable(path, error) from None
     encoding = next((name for bom, name in _BOMS if head.startswith(bom)), None)
-    lone_returns = b"\r" in head and b"\n" not in head and encoding in (None, "utf-8")
+    lone_returns = b"\r" in head and b"\n" not in head
     if encoding == "utf-8":
         stream.read(len(codecs.BOM_UTF8))
     elif encoding is not None:
         stream.read(2)
     if lone_returns or encoding in ("utf-16-le", "utf-16-be"):
-        name = "latin-1" if lone_returns and encoding is None else cast(str, encoding)
-        return cast(BinaryIO, _Transcoded(stream, name, lone_returns))
+        name = encoding or "latin-1"
+        return io.BufferedReader(_Transcoded(stream, name, lone_returns))
     return stream
 
 

@@ -84,7 +84,7 @@ def read(path: Path, options: Options) -> tuple[Recording, RawLog]:
         mag = Mag(t=t, mag=arrays["imu_mag"] * UT) if "imu_mag" in arrays else None
         if "opt_quat" in arrays:
             q_nb = quat_ned_from_enu(arrays["opt_quat"])
-            seen: BoolArray = np.isfinite(q_nb).all(axis=-1)
+            seen: BoolArray = np.asarray(np.isfinite(q_nb).all(axis=1))
             lost = int(np.count_nonzero(~seen))
             if lost:
                 what = f"the optical reference is lost in {lost} of {n} samples"

@@ -6,6 +6,7 @@ another kernel's tuple, and folds ``x == x`` to true.
 """
 
 import ast
+from functools import cache
 from pathlib import Path
 from textwrap import dedent
 
@@ -47,6 +48,7 @@ def arity(function):
     return None
 
 
+@cache
 def signatures():
     """Return arities of all kernels by module and name."""
     found = {}
@@ -62,7 +64,7 @@ class Checker:
 
     def __init__(self, tree, known):
         self.known, self.found = known, []
-        self.constants, self.functions = set(), {}
+        self.constants, self.functions, self.modules = set(), {}, {}
         self.functions.update(
             {f.name: arity(f) for f in tree.body if isinstance(f, ast.FunctionDef)}
         )
@@ -113,6 +115,8 @@ class Checker:
                 self.functions[here] = 1
             elif node.module == "strapdown.kernels._jit" and alias.name in FROM_JIT:
                 pass
+            elif f"{node.module}.{alias.name}" in self.known:
+                self.modules[here] = f"{node.module}.{alias.name}"
             elif alias.name in self.known.get(node.module or "", {}):
                 self.functions[here] = self.known[node.module][alias.name]
             elif node.module in self.known and alias.name.isupper():
@@ -259,6 +263,9 @@ class Checker:
             self.call(node, 1)
         elif isinstance(node, ast.Subscript):
             self.subscript(node)
+        elif isinstance(node, ast.Attribute) and ast.unparse(node.value) in self.modules:
+            if not node.attr.isupper():
+                self.outside(node, f"{ast.unparse(node)} is not a constant")
         else:
             self.outside(node, f"expression {type(node).__name__}")
 
@@ -307,9 +314,9 @@ class Checker:
             self.scalar(part)
 
 
-def outside(source, known=None):
+def outside(source):
     """Return what lies outside the subset, one sentence each."""
-    checker = Checker(ast.parse(source), signatures() if known is None else known)
+    checker = Checker(ast.parse(source), signatures())
     return [f"line {line}: {what}" for line, what in sorted(checker.found)]
 
 
@@ -327,6 +334,7 @@ def test_there_are_kernel_files_to_check():
 HEAD = """
 from math import isnan, sin
 from strapdown.kernels._jit import Mat, Vec, kernel
+from strapdown.kernels import status
 from strapdown.kernels.quat import mul
 
 SIZE = 2 * 3
@@ -343,7 +351,7 @@ def f(x: Vec, p: Mat, a: float, n: int, ok: bool) -> tuple[float, float]:
         p[i, 0], t = t, s
     w, u, v, z = mul(s, t, a, a, s, t, a, a)
     while n > 0:
-        n //= 2
+        n //= 2 + status.GAP
     g(x, a)
     return sin(w + u), v * z
 
@@ -366,6 +374,8 @@ BAD = {
     "allocation": ("b = np.zeros(3)", "call of np.zeros"),
     "method": ("b = x.sum()", "call of x.sum"),
     "attribute": ("b = x.size", "expression Attribute"),
+    "function of a module": ("status.f(a)", "call of status.f"),
+    "variable of a module": ("b = status.last", "status.last is not a constant"),
     "whole shape": ("b = x.shape", "expression Attribute"),
     "whole array": ("b = x", "array x as a whole"),
     "array rebound": ("x = a", "array x is given another meaning"),

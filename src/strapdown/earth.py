@@ -100,6 +100,13 @@ def lla_from_ecef(r_e: ArrayLike) -> FloatArray:
     ------
     ValueError
         If a point is nearer to the centre, where the latitude is not unique.
+
+    Examples
+    --------
+    >>> from strapdown.units import DEG
+    >>> r_e = ecef_from_lla([45 * DEG, 7 * DEG, 250.0])
+    >>> (lla_from_ecef(r_e) / [DEG, DEG, 1.0]).round(6)
+    array([ 45.,   7., 250.])
     """
     r = as_vectors("r_e", r_e, allow_nan=True)
     x, y, z = np.moveaxis(r, -1, 0)
@@ -248,6 +255,12 @@ def normal_gravity(lat: ArrayLike, height: ArrayLike = 0.0) -> FloatArray:
     -------
     ndarray, shape (...)
         Magnitude of gravity, centrifugal part included [m/s^2].
+
+    Examples
+    --------
+    >>> from strapdown.units import DEG
+    >>> round(float(normal_gravity(45 * DEG)), 5)
+    9.8062
     """
     s2 = np.sin(_latitude("lat", lat)) ** 2
     h = as_floats("height", height) / WGS84_A
@@ -337,6 +350,15 @@ def magnetic_field(lla: ArrayLike, date: dt.date | float) -> MagneticField:
     -----
     The WMM describes the field of the core. Rocks and buildings add to it: some tenths of a
     degree in declination in the open, tens of degrees beside steel.
+
+    Examples
+    --------
+    >>> from strapdown.units import DEG, UT
+    >>> field = magnetic_field([52.5 * DEG, 13.3 * DEG, 50.0], 2026.0)
+    >>> round(field.declination / DEG, 1), round(field.inclination / DEG, 1)
+    (5.0, 68.1)
+    >>> (field.field_n / UT).round(1)
+    array([18.6,  1.6, 46.4])
     """
     point = as_vector("lla", lla)
     _latitude("lla", point[0])

@@ -86,6 +86,14 @@ def rotate(q_nb: ArrayLike, v_b: ArrayLike) -> FloatArray:
     -------
     ndarray, shape (..., 3)
         The same vectors resolved in n. For the way back use ``rotate(quat_conj(q_nb), v_n)``.
+
+    Examples
+    --------
+    A vehicle that heads east has its forward axis in the east:
+
+    >>> import numpy as np
+    >>> rotate(quat_from_rpy([0, 0, np.pi / 2]), [1, 0, 0]).round(12)
+    array([0., 1., 0.])
     """
     q = as_quats("q_nb", q_nb, allow_nan=True)
     v = as_vectors("v_b", v_b, allow_nan=True)
@@ -213,6 +221,12 @@ def rpy_from_quat(q_nb: ArrayLike) -> FloatArray:
     ndarray, shape (..., 3)
         Roll in (-pi, pi], pitch in [-pi/2, pi/2], yaw in (-pi, pi] [rad]. In gimbal lock
         (pitch +-pi/2) roll is zero; the three always give the same rotation back.
+
+    Examples
+    --------
+    >>> from strapdown.units import DEG
+    >>> rpy_from_quat(quat_from_rpy([10 * DEG, -20 * DEG, 130 * DEG])) / DEG
+    array([ 10., -20., 130.])
     """
     w, x, y, z = np.moveaxis(as_quats("q_nb", q_nb, allow_nan=True), -1, 0)
     # With half angles r, p, y:  (w - y, z + x) = (cos p - sin p) (cos, sin)(y + r) and
@@ -361,6 +375,11 @@ def slerp(q_a: ArrayLike, q_b: ArrayLike, fraction: ArrayLike) -> FloatArray:
     -------
     ndarray, shape (..., 4)
         Unit quaternions on the side of `q_a`.
+
+    Examples
+    --------
+    >>> rotvec_from_quat(slerp([1, 0, 0, 0], quat_from_rotvec([0, 0, 0.4]), 0.25)).round(12)
+    array([0. , 0. , 0.1])
     """
     a, b = as_quats("q_a", q_a, allow_nan=True), as_quats("q_b", q_b, allow_nan=True)
     _require_broadcast("q_a", a, "q_b", b)

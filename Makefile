@@ -35,6 +35,7 @@ bench: $(STAMPS)/bench  ## speed, side by side with vqf and imufusion
 
 tables: $(STAMPS)/core  ## accuracy on the real recordings, for the docs
 	$(BIN)/python docs/tables/make_broad.py
+	$(BIN)/python docs/tables/make_report.py
 
 docs: $(STAMPS)/docs  ## the documentation, warnings are errors
 	$(BIN)/python -m sphinx -W --keep-going -q -b html docs docs/_build/html

@@ -1,14 +1,18 @@
 """The attitude of a solution and its errors, as sections of a report."""
 
+from typing import NamedTuple
+
 import numpy as np
 
 from strapdown._types import BoolArray, FloatArray
 from strapdown.evaluation import AttitudeErrors, match, mount_at
+from strapdown.evaluation.sync import MAX_GAP_S
 from strapdown.recording import Reference
 from strapdown.report.figures import (
     AXIS_COLORS,
     ESTIMATE,
     REFERENCE,
+    REFERENCE_PALE,
     Band,
     Panel,
     Series,
@@ -30,13 +34,18 @@ def aligned(sol: Solution) -> BoolArray:
     return np.asarray((sol.status & Status.ALIGNING) == 0)
 
 
+class TurnedReference(NamedTuple):
+    """The reference as it is drawn beside the estimate."""
+
+    t: FloatArray
+    q_nb: FloatArray
+    valid: BoolArray  # False where it is known but does not count
+
+
 def turned_reference(
     reference: Reference | None, errors: AttitudeErrors | None
-) -> tuple[FloatArray, FloatArray] | None:
-    """Return times and attitude of the reference as it is drawn beside the estimate.
-
-    An arbitrary heading differs by a constant; the reference is turned by it.
-    """
+) -> TurnedReference | None:
+    """Return the reference, turned by the constant by which an arbitrary heading differs."""
     if reference is None or reference.attitude is None:
         return None
     part = reference.attitude
@@ -48,7 +57,8 @@ def turned_reference(
         half = 0.5 * errors.heading_constant
         turn = np.array([np.cos(half), 0.0, 0.0, np.sin(half)])
         q_nb = quat_mul(np.broadcast_to(turn, q_nb.shape), q_nb)
-    return part.t[use], q_nb
+    valid = np.ones(len(q_nb), dtype=np.bool_) if part.valid is None else part.valid[use]
+    return TurnedReference(part.t[use], q_nb, valid)
 
 
 def scene_section(
@@ -61,9 +71,10 @@ def scene_section(
     ghost = None
     turned = turned_reference(reference, errors)
     if turned is not None:
-        found = match(turned[0], sol.t[rows])
+        interval = float(np.median(np.diff(turned.t))) if len(turned.t) > 1 else 0.0
+        found = match(turned.t, sol.t[rows], max_gap=max(MAX_GAP_S, 2.0 * interval))
         ghost = np.full((len(rows), 4), np.nan)
-        ghost[found.rows] = found.quats(turned[1])
+        ghost[found.rows] = found.quats(turned.q_nb)
     view = scene(sol.t[rows], sol.q_nb[rows], aligned(sol)[rows], ghost)
     return Section(title="3D view", blocks=[view])
 
@@ -72,29 +83,16 @@ def attitude_section(
     sol: Solution, reference: Reference | None, errors: AttitudeErrors | None
 ) -> Section:
     """Return roll, pitch and yaw, and the standard deviations where stated."""
-    turned = turned_reference(reference, errors)
     q_nb, whose = sol.q_nb, "box, axes as recorded"
+    turned = turned_reference(reference, errors)
     if sol.q_vb is not None:
         q_nb, whose = quat_mul(q_nb, quat_conj(sol.q_vb)), "vehicle, through the estimated mount"
+        turned = _through_mount(turned, reference)
     rpy = np.where(aligned(sol)[:, np.newaxis], rpy_from_quat(q_nb), np.nan) / DEG
-    rpy_ref = None
-    if turned is not None:
-        t_ref, q_ref = turned
-        if sol.q_vb is not None:
-            mount = reference.mount if reference is not None else None
-            q_vb = mount_at(mount, t_ref) if mount is not None else None
-            q_ref = quat_mul(q_ref, quat_conj(q_vb)) if q_vb is not None else q_ref[:0]
-        if len(q_ref):
-            rpy_ref = (t_ref, rpy_from_quat(q_ref) / DEG)
     panels = []
     for column, name in enumerate(("roll", "pitch", "yaw")):
         period = None if name == "pitch" else TURN_DEG
-        items = []
-        if rpy_ref is not None:
-            items.append(
-                Series(x=rpy_ref[0], y=rpy_ref[1][:, column], name="reference", color=REFERENCE,
-                       width=3.0, period=period)
-            )  # fmt: skip
+        items = [] if turned is None else _reference_lines(turned, column, period)
         items.append(Series(x=sol.t, y=rpy[:, column], name="estimate", period=period))
         panels.append(Panel(y_label=f"{name} [°]", items=items))
     if sol.std_attitude_n is not None:
@@ -105,11 +103,37 @@ def attitude_section(
         ]
         panels.append(Panel(y_label="std. dev. [°]", items=items, log_y=True, height=120))
     note = f"Attitude of the {whose}, relative to north, east, down; {_heading(sol)}"
-    if errors is not None and errors.heading_removed and rpy_ref is not None:
+    if errors is not None and errors.heading_removed and turned is not None:
         note += f" The reference is turned by {errors.heading_constant / DEG:.2f}° for the figure."
     return Section(
         title="Attitude", intro=note, blocks=[plot(time_figure(panels, buckets=BUCKETS))]
     )
+
+
+def _reference_lines(turned: TurnedReference, column: int, period: float | None) -> list[Series]:
+    """Return the reference where it counts, and the rest of it in a paler line."""
+    angle = rpy_from_quat(turned.q_nb)[:, column] / DEG
+    lines = []
+    for mask, name, color in (
+        (~turned.valid, "reference, not counted", REFERENCE_PALE),
+        (turned.valid, "reference", REFERENCE),
+    ):
+        if mask.any():
+            y = np.where(mask, angle, np.nan)
+            lines.append(Series(x=turned.t, y=y, name=name, color=color, width=3.0, period=period))
+    return lines
+
+
+def _through_mount(
+    turned: TurnedReference | None, reference: Reference | None
+) -> TurnedReference | None:
+    """Return the reference's attitude of the vehicle, or None if its mount is not known."""
+    if turned is None or reference is None or reference.mount is None:
+        return None
+    q_vb = mount_at(reference.mount, turned.t)
+    if q_vb is None:
+        return None
+    return turned._replace(q_nb=quat_mul(turned.q_nb, quat_conj(q_vb)))
 
 
 def _heading(sol: Solution) -> str:

@@ -19,7 +19,8 @@ from strapdown.report import decimate
 # Okabe and Ito's colours: told apart on paper and by colour-blind eyes.
 AXIS_COLORS = ("#d55e00", "#009e73", "#0072b2")  # x, y, z or north, east, down
 ESTIMATE = "#0b5cad"
-REFERENCE = "#a3abb5"
+REFERENCE = "#98a1ac"
+REFERENCE_PALE = "#e0d3b8"  # where a reference does not count
 ALARM = "#c81e1e"
 MUTED = "#5b6470"
 BAND_OPACITY = 0.16

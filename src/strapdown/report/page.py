@@ -87,6 +87,12 @@ def text(*sentences: str) -> Block:
     return Block(html=f"<p>{escape(' '.join(sentences))}</p>")
 
 
+def listed(title: str, items: Iterable[str]) -> Block:
+    """Return a list of plain sentences under a small heading."""
+    body = "".join(f"<li>{escape(item)}</li>" for item in items)
+    return Block(html=f"<h3>{escape(title)}</h3><ul>{body}</ul>")
+
+
 def cards(items: Iterable[tuple[str, str, str]]) -> Block:
     """Return a row of figures to see at once: label, value and unit of each."""
     body = "".join(

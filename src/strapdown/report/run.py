@@ -19,6 +19,7 @@ from strapdown.report.page import Block, Page, Section
 from strapdown.solution import Solution
 from strapdown.units import DEG
 
+LISTED = 12  # values of a list that are shown
 Errors = AttitudeErrors | NavigationErrors
 
 
@@ -155,6 +156,9 @@ def _summary(
     if of_attitude is not None:
         blocks.append(page.text(*attitude.error_notes(of_attitude)))
     blocks.append(streams.stream_table(rec))
+    notes = rec.meta.get("notes")
+    if isinstance(notes, (list, tuple)) and notes:
+        blocks.append(page.listed("Notes on the recording", [str(note) for note in notes]))
     return Section(title="Summary", blocks=blocks)
 
 
@@ -167,7 +171,9 @@ def _parameters(meta: Mapping[str, object]) -> list[tuple[str, str]]:
         elif isinstance(value, Mapping):
             rows += [(f"{key}.{name}", inner) for name, inner in _parameters(value)]
         elif isinstance(value, (list, tuple, np.ndarray)):
-            rows.append((key, ", ".join(_short(item) for item in value)))
+            shown = ", ".join(_short(item) for item in list(value)[:LISTED])
+            more = f", … ({len(value)} values)" if len(value) > LISTED else ""
+            rows.append((key, shown + more))
         else:
             rows.append((key, _short(value)))
     return rows

@@ -87,8 +87,8 @@ def read(
     Returns
     -------
     Recording
-        SI, axes as recorded. ``meta["source"]`` and ``meta["format"]`` tell where it is from
-        unless the file itself does, ``meta["notes"]`` what was noticed.
+        SI, axes as recorded. ``meta["source"]`` and ``meta["format"]`` tell where it is from,
+        ``meta["notes"]`` what was noticed; of a native Parquet file, all is as it was written.
 
     Raises
     ------
@@ -224,9 +224,9 @@ def _read_all(
     else:
         raw = _guarded(handler.load, target, options)
         rec = assemble(raw, options)
+    if handler.NAME == "parquet" and not raw.tables:
+        return rec, raw  # written by this package: what it says of itself stands
     meta = {"source": str(path), "format": handler.NAME, **rec.meta}
-    if handler.NAME == "parquet" and raw.format == "parquet" and "format" in rec.meta:
-        meta = dict(rec.meta)
     return replace(rec, meta=meta), raw
 
 

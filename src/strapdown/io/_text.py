@@ -70,7 +70,7 @@ def open_text(path: Path) -> BinaryIO:
     try:
         with path.open("rb") as packed:
             magic = packed.read(2)
-        stream = cast(BinaryIO, gzip.open(path)) if magic == GZIP_MAGIC else path.open("rb")
+        stream = cast(BinaryIO, gzip.GzipFile(path)) if magic == GZIP_MAGIC else path.open("rb")
         head = stream.read(HEAD)
         stream.seek(0)
     except (OSError, EOFError, zlib.error) as error:

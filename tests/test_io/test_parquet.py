@@ -74,9 +74,7 @@ def test_a_table_of_other_origin_is_recognised_by_names(tmp_path: Path) -> None:
     table = six_axes()
     names = ["timestamp", "gyro_x_dps", "gyro_y_dps", "gyro_z_dps", "ax", "ay", "az"]
     columns = dict(zip(names, table.T, strict=True))
-    columns["timestamp"] = (1717156800 * 10**9 + np.arange(50) * 10**7).astype(
-        "datetime64[ns]"
-    )
+    columns["timestamp"] = (1717156800 * 10**9 + np.arange(50) * 10**7).astype("datetime64[ns]")
     pq.write_table(pa.table(columns), tmp_path / "a.parquet")
     rec = sd.read(tmp_path / "a.parquet")
     np.testing.assert_allclose(rec.imu.t, table[:, 0], atol=1e-12)

@@ -15,6 +15,7 @@ from strapdown.kernels.memory import (
     BG,
     D_ACC,
     D_MAG,
+    DT,
     HEAD,
     MAG,
     P_DECLINATION,
@@ -22,20 +23,18 @@ from strapdown.kernels.memory import (
     P_HEAD,
     SKIP,
     START,
-    STATUS,
     STD_ATT,
     STD_BA,
     STD_BG,
-    T,
-    V,
     W_HEAD,
     WIDEN,
-    DT,
     Q,
+    T,
+    V,
     begin,
     load,
     note_sigma,
-    post_mag,
+    post,
     set_status,
     store,
 )
@@ -583,7 +582,9 @@ def run(
 
 
 @kernel
-def update(x: Vec, P: Mat, p: Vec, w: Vec, t: float, gyr: Vec, acc: Vec, mag: Vec) -> None:
-    """One `step` from vectors, for real-time code."""
-    post_mag(x, mag)
-    step(x, P, p, w, t, gyr[0], gyr[1], gyr[2], acc[0], acc[1], acc[2])
+def update(x: Vec, P: Mat, p: Vec, w: Vec, t: float, gyr: Vec, acc: Vec, mag: Vec) -> bool:
+    """One `step` from vectors, for real-time code; False if their lengths are wrong."""
+    ok = post(x, gyr, acc, mag)
+    if ok:
+        step(x, P, p, w, t, gyr[0], gyr[1], gyr[2], acc[0], acc[1], acc[2])
+    return ok

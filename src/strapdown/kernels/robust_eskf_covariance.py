@@ -90,7 +90,7 @@ def enter(P: Mat, i: int, h_lag: float, r: float, g: Vec, g0: int) -> float:
     """
     for j in range(N):
         g[g0 + j] = P[i, j] + h_lag * P[LAG, j]
-    s = g[g0 + i] + h_lag * g[g0 + LAG] + r
+    s = float(g[g0 + i] + h_lag * g[g0 + LAG] + r)
     k = 1.0 / sqrt(s)
     for j in range(N):
         g[g0 + j] *= k

@@ -40,7 +40,15 @@ from strapdown.kernels.robust_eskf import (
     RECORD_SIZE,
     step,
 )
-from strapdown.kernels.robust_eskf_covariance import EBG, LAG, PHI, VEL, N, transpose_on_row
+from strapdown.kernels.robust_eskf_covariance import (
+    EBG,
+    INTERVAL,
+    LAG,
+    PHI,
+    VEL,
+    N,
+    transpose_on_row,
+)
 
 # Columns of the smoothed corrections, six of attitude and gyro bias each: at the end of an
 # interval to the filter's state after its update, and to that before it; deviations.
@@ -121,7 +129,7 @@ def _take_back(r: Mat, n: int, m: int, adjoint: Mat) -> None:
 
 @kernel
 def _cut(adjoint: Mat, i: int) -> None:
-    """What was learnt later of element i says nothing on the time before."""
+    """Cut element i off: what is learnt of it later says nothing on the time before."""
     for j in range(N + 1):
         adjoint[j, i] = 0.0
     for j in range(N):
@@ -155,7 +163,7 @@ def backward(records: Mat, count: int, adjoint: Mat, sums: Vec, correction: Mat)
         for back_m in range(int(records[n, R_COUNT - RECORD])):
             m = int(records[n, R_COUNT - RECORD]) - 1 - back_m
             _take_back(records, n, R_MEASURED - RECORD + m * MEASURED, adjoint)
-        for i in range(sums.shape[0]):
+        for i in range(INTERVAL):
             sums[i] = records[n, R_SUMS - RECORD + i]
         for i in range(N + 1):
             transpose_on_row(adjoint, i, sums, 0)
@@ -200,9 +208,7 @@ def apply(
         if n == 0:
             left = 0
             c_left = BEFORE
-        elif n == count:  # after the last interval
-            c_right = AFTER
-        elif ends[n] == k:  # after its update
+        elif n == count or ends[n] == k:  # after the last interval, or right after an update
             c_right = AFTER
         else:
             f = (t[k] - t[ends[left]]) / (t[ends[n]] - t[ends[left]])
@@ -218,11 +224,12 @@ def apply(
             g * correction[left, c_left + 2] + f * correction[right, c_right + 2] + turn,
         )
         j = Q - base
-        q0, q1, q2, q3 = mul(e0, e1, e2, e3, out[k, j], out[k, j + 1], out[k, j + 2], out[k, j + 3])
+        q0, q1, q2, q3 = out[k, j], out[k, j + 1], out[k, j + 2], out[k, j + 3]
+        q0, q1, q2, q3 = mul(e0, e1, e2, e3, q0, q1, q2, q3)
         q0, q1, q2, q3 = normalize(q0, q1, q2, q3)
         out[k, j], out[k, j + 1], out[k, j + 2], out[k, j + 3] = q0, q1, q2, q3
         bx, by, bz = out[k, BG - base], out[k, BG - base + 1], out[k, BG - base + 2]
-        rx, ry, rz = rotate(q0, q1, q2, q3, gyr[k, 0] - bx, gyr[k, 1] - by, gyr[k, 2] - bz)
+        rx, ry, _ = rotate(q0, q1, q2, q3, gyr[k, 0] - bx, gyr[k, 1] - by, gyr[k, 2] - bz)
         rate2 = max(rx * rx, ry * ry)
         for i in range(3):
             std = g * correction[left, STD + i] + f * correction[right, STD + i]

@@ -94,8 +94,8 @@ class Panel:
         Height of the axes [px].
     log_x, log_y : bool
         Logarithmic axes.
-    y_range : tuple of float, optional
-        Limits, in the panel's unit; otherwise what fits.
+    x_range, y_range : tuple of float, optional
+        Limits, in the panel's unit; otherwise what fits. A time figure has one `span`.
     y_ticks : mapping of float to str, optional
         Names at heights, instead of numbers.
     equal : bool
@@ -109,6 +109,7 @@ class Panel:
     height: int = 150
     log_x: bool = False
     log_y: bool = False
+    x_range: tuple[float, float] | None = None
     y_range: tuple[float, float] | None = None
     y_ticks: dict[float, str] | None = None
     equal: bool = False
@@ -229,6 +230,8 @@ def grid_figure(
             x_axis = _axis(panel.x_label) | {"domain": [left, left + width], "anchor": y_name}
             if panel.log_x:
                 x_axis["type"] = "log"
+            if panel.x_range is not None:
+                x_axis["range"] = _limits(panel.x_range, log=panel.log_x)
             domain = [(top - height) / inner, top / inner]
             y_axis = _y_axis(panel) | {"domain": domain, "anchor": x_name}
             layout["shapes"].append(_frame([left, left + width], domain))
@@ -343,9 +346,7 @@ def _y_axis(panel: Panel) -> dict[str, Any]:
     elif not panel.y_ticks:
         axis |= {"zeroline": True, "zerolinecolor": "#c9ced6", "zerolinewidth": 1}
     if panel.y_range is not None:
-        low, high = panel.y_range
-        axis["range"] = [float(np.log10(low)), float(np.log10(high))] if panel.log_y else [
-            low, high]  # fmt: skip
+        axis["range"] = _limits(panel.y_range, log=panel.log_y)
     if panel.y_ticks:
         axis |= {
             "tickmode": "array",
@@ -355,6 +356,11 @@ def _y_axis(panel: Panel) -> dict[str, Any]:
             "showgrid": False,
         }
     return axis
+
+
+def _limits(limits: tuple[float, float], *, log: bool) -> list[float]:
+    """Return limits as plotly wants them: exponents on a logarithmic axis."""
+    return [float(x) for x in (np.log10(limits) if log else limits)]
 
 
 def _span(panels: Sequence[Panel]) -> tuple[float, float]:

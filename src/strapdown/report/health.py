@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from strapdown._types import FloatArray
 from strapdown.report import decimate
 from strapdown.report.figures import (
     ALARM,
@@ -19,6 +20,8 @@ from strapdown.report.figures import (
 from strapdown.report.page import Block, Section, plot, table, text
 from strapdown.solution import Diagnostics, Outcome, Solution, Status
 from strapdown.units import DPS
+
+DWARFED = 10.0  # 3 sigma over the largest innovation, from which on both cannot be seen
 
 
 class Flag(NamedTuple):
@@ -133,7 +136,8 @@ def innovation_section(sol: Solution) -> Section:
             blocks.append(plot(time_figure(_innovation_panels(d)), f"Innovations of {name}."))
     return Section(
         title="Innovations",
-        intro="Measured less predicted, one row for each measurement that was looked at.",
+        intro="Measured less predicted, one row for each measurement that was looked at. Where "
+        "3 sigma is far beyond all innovations it fills the panel.",
         blocks=blocks,
     )
 
@@ -176,5 +180,21 @@ def _innovation_panels(d: Diagnostics) -> list[Panel]:
             x, y = d.t[refused], d.innovation[refused, i]
             items.append(Series(x=x, y=y, name="rejected", color=ALARM, kind="points", width=3.5))
         unit = f" [{d.unit}]" if d.unit else ""
-        panels.append(Panel(y_label=f"{label}{unit}", items=items, height=105))
+        limits = _innovation_limits(d, i)
+        panels.append(Panel(y_label=f"{label}{unit}", items=items, height=105, y_range=limits))
     return panels
+
+
+def _median(values: FloatArray) -> float:
+    finite = values[np.isfinite(values)]
+    return float(np.median(finite)) if len(finite) else 0.0
+
+
+def _innovation_limits(d: Diagnostics, column: int) -> tuple[float, float] | None:
+    """Return limits that show the innovations where sigma would dwarf them."""
+    size = np.abs(d.innovation[:, column])
+    size, sigma = size[np.isfinite(size)], d.sigma[:, column]
+    largest = float(size.max(initial=0.0))
+    if largest > 0.0 and 3.0 * _median(sigma) > DWARFED * largest:
+        return -1.2 * largest, 1.2 * largest
+    return None

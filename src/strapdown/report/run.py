@@ -149,7 +149,9 @@ def _summary(
         tables.append(attitude.error_table(of_attitude))
     parameters = _parameters(sol.meta)
     if parameters:
-        tables.append(page.table(("parameter", "value"), parameters, caption="Estimator"))
+        tables.append(
+            page.table(("parameter", "value"), parameters, caption="Estimator, SI units")
+        )
     blocks = [page.cards(cards)]
     if tables:
         blocks.append(page.beside(*tables))
@@ -181,6 +183,8 @@ def _parameters(meta: Mapping[str, object]) -> list[tuple[str, str]]:
 
 def _short(value: object) -> str:
     """Return a value as one would type it."""
+    if value is None:
+        return "none"
     if isinstance(value, bool):
         return "yes" if value else "no"
     return f"{value:.6g}" if isinstance(value, float) else str(value)

@@ -12,7 +12,7 @@ from strapdown.units import DEG, DPS, HPA, MS, UT
 
 GAP_FACTOR = 1.5  # an interval this many times the median one is a gap
 GAPS_LISTED = 20
-HISTOGRAM_BINS = 60
+HISTOGRAM_BINS = 61
 
 
 def sensor_panels(rec: Recording) -> list[Panel]:
@@ -100,10 +100,10 @@ def interval_panel(name: str, t: FloatArray) -> Panel:
     median = float(np.median(interval))
     low = float(interval.min())
     high = float(min(interval.max(), 3.0 * median))
-    if high - low < 0.02 * median:  # an even clock: give the one bar some room
-        low, high = low - 0.01 * median, high + 0.01 * median
+    if high - low < 0.2 * median:  # an even clock: the median falls into the middle of a bar
+        low, high = 0.9 * median, 1.1 * median
     edges = np.linspace(low, high, HISTOGRAM_BINS + 1)
-    count = np.histogram(np.minimum(interval, high), edges)[0].astype(np.float64)
+    count = np.histogram(np.clip(interval, low, high), edges)[0].astype(np.float64)
     centres = 0.5 * (edges[1:] + edges[:-1])
     bars = Series(
         x=centres[count > 0],
@@ -119,6 +119,7 @@ def interval_panel(name: str, t: FloatArray) -> Panel:
         title=f"{name}, median {median:.4g} ms",
         items=[bars],
         log_y=True,
+        x_range=(low, high),
         y_range=(0.5, 2.0 * float(count.max())),
         height=170,
     )

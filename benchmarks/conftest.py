@@ -51,9 +51,9 @@ def table() -> Callable[[str, str, str, str], None]:
 @pytest.fixture(scope="session")
 def recording():
     """50,000 samples of the demo's motion, 9 axes at 100 Hz."""
-    from strapdown.simulation import demo_recording
+    from strapdown.simulation import demo
 
-    return demo_recording(duration=500.0, rate=100.0)
+    return demo.recording(duration=500.0, rate=100.0)
 
 
 @pytest.fixture(scope="session")

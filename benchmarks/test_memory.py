@@ -15,7 +15,7 @@ def peak():
 
 n = int(sys.argv[1])
 flt = sd.estimators.create(sys.argv[2])
-small = sd.simulation.demo_recording(12.0, 100.0)
+small = sd.simulation.demo.recording(12.0, 100.0)
 flt.run(small, diagnostics=False)  # compiles
 idle = peak()
 rng = np.random.default_rng(0)

@@ -15,7 +15,7 @@ import strapdown as sd
 from strapdown.constants import G0
 from strapdown.units import DPS, GAUSS
 
-made = sd.simulation.demo_recording(duration=20.0, rate=100.0)
+made = sd.simulation.demo.recording(duration=20.0, rate=100.0)
 columns = np.column_stack((made.imu.gyr / DPS, made.imu.acc / G0, made.mag.mag / GAUSS))
 
 with tempfile.TemporaryDirectory() as folder:

@@ -12,7 +12,7 @@ degree; integrating the gyro alone drifts: a bias of 0.4 deg/s makes tens of deg
 import strapdown as sd
 from strapdown.units import DPS
 
-simulated = sd.simulation.demo_recording(seed=7)
+simulated = sd.simulation.demo.recording(seed=7)
 t, gyr, acc = simulated.imu.t, simulated.imu.gyr, simulated.imu.acc  # s, rad/s, m/s^2
 mag = simulated.mag.mag  # T
 

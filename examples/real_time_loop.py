@@ -15,7 +15,7 @@ import numpy as np
 import strapdown as sd
 from strapdown.units import DEG
 
-rec = sd.simulation.demo_recording(seed=3)
+rec = sd.simulation.demo.recording(seed=3)
 flt = sd.attitude.Madgwick(beta=0.05)
 batch = flt.run(rec)
 

@@ -35,7 +35,7 @@ def main() -> None:
     lines = ["| Log | samples | report [MB] | time to write [s] |", "|---|---|---|---|"]
     with tempfile.TemporaryDirectory() as folder:
         for length in LENGTHS_S:
-            rec = sd.simulation.demo_recording(length, RATE_HZ)
+            rec = sd.simulation.demo.recording(length, RATE_HZ)
             sol, took = solution(rec), []
             for _ in range(2):
                 start = time.perf_counter()

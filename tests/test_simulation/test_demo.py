@@ -5,17 +5,17 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from strapdown.constants import OMEGA_IE
-from strapdown.simulation import demo as module
-from strapdown.simulation import demo_recording, demo_truth
+
+from strapdown.simulation import demo
 from strapdown.simulation.demo import SensorErrors
 from strapdown.units import DEG
 
-LAT, _, HEIGHT = module.PLACE
+LAT, _, HEIGHT = demo.PLACE
 
 
 def around(t: float, h: float):
     """Truth a step before, at and after a time, in one call."""
-    return module._truth(np.array([t - h, t, t + h]), 60.0)
+    return demo._truth(np.array([t - h, t, t + h]), 60.0)
 
 
 @pytest.fixture(scope="module")
@@ -74,16 +74,16 @@ def test_velocity_is_that_of_the_position(t):
 
 
 def test_box_is_at_rest_at_both_ends_and_moves_in_between():
-    truth = demo_truth()
+    truth = demo.truth()
     turning = np.linalg.norm(truth.omega_ib_b, axis=1)
-    ends = (truth.t < module.REST) | (truth.t > 60.0 - module.REST)
+    ends = (truth.t < demo.REST) | (truth.t > 60.0 - demo.REST)
     assert turning[ends].max() < 1.01 * OMEGA_IE
     assert turning[~ends].max() > 100 * DEG
     assert np.array_equal(truth.v_n[ends], np.zeros_like(truth.v_n[ends]))
 
 
 def test_gyro_sample_covers_the_interval_that_ends_at_it(silent):
-    recording, truth = demo_recording(errors=silent), demo_truth()
+    recording, truth = demo.recording(errors=silent), demo.truth()
     q = Rotation.from_quat(truth.q_nb, scalar_first=True)
     step = (q[:-1].inv() * q[1:]).as_rotvec() * 100.0
     middle = 0.5 * (truth.omega_ib_b[:-1] + truth.omega_ib_b[1:])
@@ -94,7 +94,7 @@ def test_gyro_sample_covers_the_interval_that_ends_at_it(silent):
 
 
 def test_magnetometer_sees_the_field_of_the_world_magnetic_model(silent):
-    recording = demo_recording(errors=silent)
+    recording = demo.recording(errors=silent)
     q_nb = Rotation.from_quat(recording.reference.attitude.q_nb, scalar_first=True)
     m_n = q_nb.apply(recording.mag.mag)
     # Munich: 48.8 uT, dip 64.4 deg, declination 4.3 deg east in 2026 (maps, to some tenths)
@@ -103,10 +103,10 @@ def test_magnetometer_sees_the_field_of_the_world_magnetic_model(silent):
 
 
 def test_same_seed_same_recording_and_noise_of_the_stated_size():
-    a, b, c = demo_recording(seed=3), demo_recording(seed=3), demo_recording(seed=4)
+    a, b, c = demo.recording(seed=3), demo.recording(seed=3), demo.recording(seed=4)
     assert np.array_equal(a.imu.gyr, b.imu.gyr)
     assert not np.array_equal(a.imu.gyr, c.imu.gyr)
-    rest = a.imu.t < module.REST
+    rest = a.imu.t < demo.REST
     chip = SensorErrors()
     std = a.imu.gyr[rest].std(axis=0, ddof=1)
     # 400 samples: the standard deviation is good to 3.5 %, four sigma
@@ -114,10 +114,10 @@ def test_same_seed_same_recording_and_noise_of_the_stated_size():
 
 
 def test_streams_and_metadata_are_complete():
-    recording = demo_recording()
+    recording = demo.recording()
     assert {name for name, _ in recording.streams()} == {"imu", "mag"}
     assert recording.reference.heading == "true"
-    assert recording.meta["epoch_utc"] == module.EPOCH_UTC
+    assert recording.meta["epoch_utc"] == demo.EPOCH_UTC
 
 
 @pytest.mark.parametrize(
@@ -130,4 +130,4 @@ def test_streams_and_metadata_are_complete():
 )
 def test_impossible_demos_are_refused(arguments, message):
     with pytest.raises(ValueError, match=message):
-        demo_truth(**arguments)
+        demo.truth(**arguments)

@@ -115,8 +115,8 @@ class RobustEskf(AttitudeEstimator):
 
     Examples
     --------
-    >>> from strapdown.simulation import demo_recording
-    >>> rec = demo_recording(duration=20.0)
+    >>> from strapdown.simulation import demo
+    >>> rec = demo.recording(duration=20.0)
     >>> flt = RobustEskf()
     >>> filtered, smoothed = flt.run(rec), flt.smooth(rec)
     >>> filtered.causal, smoothed.causal

@@ -31,11 +31,11 @@ def demo(
     """
     from strapdown import io
     from strapdown.recording import Recording
-    from strapdown.simulation import demo_recording
+    from strapdown.simulation.demo import recording
 
     def simulate() -> Recording:
         with _errors.given():
-            rec = demo_recording(seconds, rate, seed=seed)
+            rec = recording(seconds, rate, seed=seed)
         if save is not None:
             io.write(rec, save)
         return rec

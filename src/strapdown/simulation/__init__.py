@@ -1,5 +1,5 @@
 """Recordings made in code, with their truth."""
 
-from strapdown.simulation.demo import demo_recording, demo_truth
+from strapdown.simulation import demo
 
-__all__ = ["demo_recording", "demo_truth"]
+__all__ = ["demo"]

@@ -64,7 +64,7 @@ class SensorErrors:
     mag_sigma: float = 0.4 * UT
 
 
-def demo_truth(duration: float = 60.0, rate: float = 100.0) -> Truth:
+def truth(duration: float = 60.0, rate: float = 100.0) -> Truth:
     """Return the exact motion of the demo.
 
     Parameters
@@ -87,7 +87,7 @@ def demo_truth(duration: float = 60.0, rate: float = 100.0) -> Truth:
     return _truth(np.arange(round(duration * rate) + 1) / rate, duration)
 
 
-def demo_recording(
+def recording(
     duration: float = 60.0,
     rate: float = 100.0,
     *,
@@ -114,12 +114,12 @@ def demo_recording(
         others what is there at the sample.
     """
     chip = SensorErrors() if errors is None else errors
-    truth = demo_truth(duration, rate)
-    t, n = truth.t, len(truth.t)
+    exact = truth(duration, rate)
+    t, n = exact.t, len(exact.t)
     # Simpson's rule over each interval: off by 1e-9 rad/s at 100 Hz
     half = _truth(t - 0.5 / rate, duration).omega_ib_b
     start = _truth(t - 1.0 / rate, duration).omega_ib_b
-    mean_rate = (start + 4.0 * half + truth.omega_ib_b) / 6.0
+    mean_rate = (start + 4.0 * half + exact.omega_ib_b) / 6.0
 
     gyr_rng, acc_rng, mag_rng = (
         np.random.default_rng(s) for s in np.random.SeedSequence(seed).spawn(3)
@@ -128,16 +128,16 @@ def demo_recording(
     gyr_noise = chip.gyr_density * per_sample * gyr_rng.standard_normal((n, 3))
     acc_noise = chip.acc_density * per_sample * acc_rng.standard_normal((n, 3))
     mag_noise = chip.mag_sigma * mag_rng.standard_normal((n, 3))
-    m_b = _to_body(truth.q_nb, truth.m_n)
+    m_b = _to_body(exact.q_nb, exact.m_n)
     lat, lon, height = PLACE
     return Recording(
         imu=Imu(
             t=t,
             gyr=mean_rate + chip.gyr_bias + gyr_noise,
-            acc=truth.f_b + chip.acc_bias + acc_noise,
+            acc=exact.f_b + chip.acc_bias + acc_noise,
         ),
         mag=Mag(t=t, mag=m_b + chip.mag_bias + mag_noise),
-        reference=Reference(attitude=AttitudeReference(t=t, q_nb=truth.q_nb), heading="true"),
+        reference=Reference(attitude=AttitudeReference(t=t, q_nb=exact.q_nb), heading="true"),
         meta={
             "name": "demo",
             "source": "simulated",

@@ -1,0 +1,30 @@
+"""Attitude estimators; each module reads from top to bottom with its source beside it."""
+
+from typing import Any
+
+from strapdown import estimator as _estimator
+from strapdown.attitude.heading import declination
+from strapdown.attitude.integration import GyroIntegration
+from strapdown.attitude.madgwick import Madgwick
+from strapdown.attitude.mahony import Mahony
+from strapdown.attitude.mekf import Mekf
+from strapdown.attitude.robust_eskf import RobustEskf
+
+__all__ = ["GyroIntegration", "Madgwick", "Mahony", "Mekf", "RobustEskf", "create", "declination"]
+
+
+def create(name: str, **parameters: Any) -> Any:
+    """Return the estimator `name` with the given parameters; see `strapdown.estimators.create`.
+
+    Parameters
+    ----------
+    name : str
+        As `strapdown.estimators.names` lists it.
+    **parameters
+        Fields of its dataclass.
+
+    Returns
+    -------
+    Estimator
+    """
+    return _estimator.create(name, **parameters)

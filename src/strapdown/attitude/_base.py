@@ -1,0 +1,67 @@
+"""What attitude estimators have in common beyond the protocol."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from strapdown import _checks
+from strapdown._types import FloatArray
+from strapdown.estimator import Estimator
+from strapdown.kernels import memory as _m
+from strapdown.recording import Recording
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AttitudeEstimator(Estimator):
+    """Parameters of every attitude estimator.
+
+    Parameters
+    ----------
+    use_mag : bool
+        Whether to use the magnetometer where there is one. False: heading is arbitrary.
+    declination : float, optional
+        Heading of magnetic north, east positive [rad]. Given, heading is true; None, magnetic.
+    max_gap : float
+        A longer interval between samples [s] is a gap: covariance is widened, or, where there
+        is none, attitude is aligned again and the bias kept.
+    gyr_range, acc_range : float
+        Ends of the sensors' ranges [rad/s], [m/s^2]: a sample there is flagged, and such an
+        acceleration is not used. Infinite switches the test off.
+    """
+
+    use_mag: bool = True
+    declination: float | None = None
+    max_gap: float = 1.0
+    gyr_range: float = math.inf
+    acc_range: float = math.inf
+
+    def __post_init__(self) -> None:
+        """Check the parameters."""
+        if not isinstance(self.use_mag, bool):
+            raise TypeError(f"`use_mag` must be True or False, got {self.use_mag!r}.")
+        if self.declination is not None:
+            _checks.in_range("declination", self.declination, -math.pi, math.pi)
+        _checks.positive("max_gap", self.max_gap)
+        for name in ("gyr_range", "acc_range"):
+            value = getattr(self, name)
+            if value != math.inf:
+                _checks.positive(name, value)
+
+    def _common(self, size: int) -> FloatArray:
+        """Return a parameter vector with the common cells filled."""
+        p = np.zeros(size)
+        p[_m.P_MAX_GAP] = self.max_gap
+        p[_m.P_USE_MAG] = float(self.use_mag)
+        p[_m.P_COS_D] = math.cos(self.declination or 0.0)
+        p[_m.P_SIN_D] = math.sin(self.declination or 0.0)
+        p[_m.P_GYR_RANGE] = self.gyr_range
+        p[_m.P_ACC_RANGE] = self.acc_range
+        p[_m.P_REALIGN] = 1.0
+        return p
+
+    def _heading_reference(self, rec: Recording) -> str:
+        """Return what the heading of a solution is measured from."""
+        if rec.mag is None or not self.use_mag:
+            return "arbitrary"
+        return "magnetic" if self.declination is None else "true"

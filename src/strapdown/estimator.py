@@ -1,0 +1,599 @@
+"""What every estimator is, and the one registry in which they all stand.
+
+An estimator is a frozen dataclass of its parameters. What it remembers is a `State`; the same
+compiled kernel makes ``run``, ``advance``, ``step`` and the ``tracker``, so all four agree to
+the last bit.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, fields
+from importlib import import_module
+from types import ModuleType
+from typing import Any, ClassVar, NamedTuple, Protocol, TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from strapdown import _checks
+from strapdown._types import FloatArray, IntArray
+from strapdown.errors import MissingStream
+from strapdown.kernels import memory as _m
+from strapdown.kernels import status as _s
+from strapdown.kernels._jit import is_compiled
+from strapdown.recording import Recording
+from strapdown.solution import COLUMNS, Diagnostics, Solution
+
+_NO_VECTOR: FloatArray = np.empty(0)
+_NO_TIMES: FloatArray = np.empty(0)
+_NO_ROWS: FloatArray = np.empty((0, 3))
+_NO_EVENTS: FloatArray = np.empty((0, 3))
+_NO_DIAGNOSTICS: FloatArray = np.empty((0, _m.W_HEAD))
+_FLOAT = np.dtype(np.float64)
+
+# Where the arrays of a solution stand in the memory.
+CELLS: Mapping[str, int] = {
+    "q_nb": _m.Q,
+    "gyr_bias": _m.BG,
+    "std_attitude_n": _m.STD_ATT,
+    "std_gyr_bias": _m.STD_BG,
+    "lla": _m.LLA,
+    "v_n": _m.V,
+    "std_position_n": _m.STD_POS,
+    "std_velocity_n": _m.STD_V,
+    "acc_bias": _m.BA,
+    "std_acc_bias": _m.STD_BA,
+    "q_vb": _m.Q_VB,
+}
+
+
+class State(NamedTuple):
+    """All that an estimator remembers between two samples.
+
+    ``np.savez(file, **state._asdict())`` saves it, ``State(**np.load(file))`` restores it.
+
+    Attributes
+    ----------
+    name : str
+        Registry name of the estimator it belongs to.
+    x : ndarray, shape (m,)
+        Its memory; `strapdown.kernels.memory` names the cells.
+    P : ndarray, shape (s, s)
+        Covariance of its error state, (0, 0) if it has none.
+    """
+
+    name: str
+    x: FloatArray
+    P: FloatArray
+
+    @property
+    def t(self) -> float:
+        """Time of the last sample used [s]; NaN before the first."""
+        return float(self.x[_m.T])
+
+    @property
+    def q_nb(self) -> FloatArray:
+        """Attitude, body to NED, shape (4,)."""
+        return self.x[_m.Q : _m.Q + 4].copy()
+
+    @property
+    def gyr_bias(self) -> FloatArray:
+        """Gyro bias in b, shape (3,) [rad/s]."""
+        return self.x[_m.BG : _m.BG + 3].copy()
+
+    @property
+    def status(self) -> int:
+        """`Status` bits of the last sample."""
+        return int(self.x[_m.STATUS])
+
+
+class Tracker:
+    """The stateful form of an estimator, for real-time code: one call per sample.
+
+    Parameters
+    ----------
+    estimator : Estimator
+        Whose parameters and kernel it uses.
+    state : State, optional
+        Where to begin; knows nothing by default.
+    """
+
+    __slots__ = ("_P", "_name", "_p", "_t", "_update", "_w", "_x")
+
+    def __init__(self, estimator: "Estimator", state: State | None = None) -> None:
+        state = estimator._own(estimator.init() if state is None else state)
+        self._name = state.name
+        self._p, self._w = estimator._params(), np.zeros(estimator._kernel().W_SIZE)
+        self._x, self._P = state.x.copy(), state.P.copy()
+        self._t = state.t if state.t == state.t else -np.inf
+        self._update = estimator._kernel().update
+        # Compile for exactly these types now; any other is then converted, never compiled for.
+        zero = np.zeros(3)
+        self._update(self._x.copy(), self._P.copy(), self._p, self._w, 0.0, zero, zero, zero)
+
+    def update(
+        self, t: float, gyr: ArrayLike, acc: ArrayLike, mag: ArrayLike | None = None
+    ) -> None:
+        """Feed one sample.
+
+        Parameters
+        ----------
+        t : float
+            Time [s], later than that of the sample before.
+        gyr : array_like, shape (3,)
+            Angular rate [rad/s]; float64 arrays are the quickest.
+        acc : array_like, shape (3,)
+            Specific force [m/s^2].
+        mag : array_like, shape (3,), optional
+            Magnetic field [T], if there is a new one.
+
+        Raises
+        ------
+        ValueError
+            If time does not increase or a vector has not three components.
+        """
+        if not t > self._t:
+            raise ValueError(f"`t` must increase, got {t} after {self._t}.")
+        if type(gyr) is not np.ndarray or gyr.dtype is not _FLOAT or not gyr.flags.carray:
+            gyr = _checks.as_vector("gyr", gyr, allow_nan=True).copy()
+        if type(acc) is not np.ndarray or acc.dtype is not _FLOAT or not acc.flags.carray:
+            acc = _checks.as_vector("acc", acc, allow_nan=True).copy()
+        if mag is None:
+            mag = _NO_VECTOR
+        elif type(mag) is not np.ndarray or mag.dtype is not _FLOAT or not mag.flags.carray:
+            mag = _checks.as_vector("mag", mag, allow_nan=True).copy()
+        if not self._update(self._x, self._P, self._p, self._w, t, gyr, acc, mag):
+            shapes = ", ".join(str(np.shape(v)) for v in (gyr, acc, mag))
+            raise ValueError(f"`gyr`, `acc` and `mag` must have shape (3,), got {shapes}.")
+        self._t = t
+
+    @property
+    def state(self) -> State:
+        """A copy of what it remembers."""
+        return State(self._name, self._x.copy(), self._P.copy())
+
+    @property
+    def q_nb(self) -> FloatArray:
+        """Attitude, body to NED, shape (4,)."""
+        return self._x[_m.Q : _m.Q + 4].copy()
+
+    @property
+    def gyr_bias(self) -> FloatArray:
+        """Gyro bias in b, shape (3,) [rad/s]."""
+        return self._x[_m.BG : _m.BG + 3].copy()
+
+    @property
+    def status(self) -> int:
+        """`Status` bits of the last sample."""
+        return int(self._x[_m.STATUS])
+
+
+class KernelModule(Protocol):
+    """What a module under `strapdown.kernels` offers to be an estimator."""
+
+    W_SIZE: int
+    run: Any
+    step: Any
+    update: Any
+
+
+class Estimator:
+    """Base of all estimators: a frozen dataclass of parameters with pure methods.
+
+    A subclass gives its kernel module, its parameter vector and its empty memory; batch,
+    pieces, single samples and the tracker follow from them.
+    """
+
+    __slots__ = ()
+    NAME: ClassVar[str]
+    OUTPUTS: ClassVar[tuple[str, ...]] = ("q_nb", "gyr_bias")
+
+    @staticmethod
+    def _kernel() -> Any:
+        """Return the kernel module."""
+        raise NotImplementedError
+
+    def _params(self) -> FloatArray:
+        """Return the parameter vector `p` of the kernel."""
+        raise NotImplementedError
+
+    def _memory(self) -> tuple[FloatArray, FloatArray]:
+        """Return `x` and `P` before the first sample."""
+        x = np.zeros(_m.HEAD)
+        x[_m.T] = np.nan
+        x[_m.Q] = x[_m.Q_VB] = 1.0
+        x[_m.STATUS] = _s.ALIGNING
+        return x, np.zeros((0, 0))
+
+    def init(self, *, attitude: ArrayLike | None = None) -> State:
+        """Return the state before the first sample.
+
+        Parameters
+        ----------
+        attitude : array_like, shape (4,), optional
+            Known q_nb; without it alignment is part of the state.
+
+        Returns
+        -------
+        State
+        """
+        x, P = self._memory()
+        if attitude is not None:
+            x[_m.Q : _m.Q + 4] = _checks.as_quats(
+                "attitude", _checks.as_vector("attitude", attitude, 4)
+            )
+            x[_m.ALIGNED] = _m.GIVEN
+            x[_m.STATUS] = 0.0
+        return State(self.NAME, x, P)
+
+    def advance(
+        self, state: State, rec: Recording, *, diagnostics: bool = True
+    ) -> tuple[Solution, State]:
+        """Go on from `state` over the next piece of a recording.
+
+        Parameters
+        ----------
+        state : State
+            Left as it is.
+        rec : Recording
+            Later than `state`; may be empty.
+        diagnostics : bool
+            Whether to keep a row per measurement.
+
+        Returns
+        -------
+        Solution, State
+            What it believes at each IMU sample, and what it remembers after the last.
+
+        Raises
+        ------
+        MissingStream
+            If the recording lacks a stream that the estimator needs.
+        ValueError
+            If the recording begins before the state ends, or the state is another estimator's.
+        """
+        state = self._own(state)
+        x, P = state.x.copy(), state.P.copy()
+        imu = rec.need("imu")
+        for name in entry(self.NAME).needs:
+            rec.need(name)
+        if len(imu) and imu.t[0] <= state.t:
+            raise ValueError(f"`rec` must begin after the state, got {imu.t[0]} after {state.t}.")
+        mag = rec.mag
+        t_mag, field = (_NO_TIMES, _NO_ROWS) if mag is None else (mag.t, mag.mag)
+        acc = imu.acc
+        if imu.acc_real is not None:  # a held sample is no measurement
+            acc = np.where(imu.acc_real[:, None], acc, np.inf)
+        last = max(CELLS[name] + len(COLUMNS[name]) for name in self.OUTPUTS)
+        out = np.empty((len(imu), last - _m.STATUS))
+        diag = np.empty((len(imu), _m.W_HEAD)) if diagnostics else _NO_DIAGNOSTICS
+        kernel = self._kernel()
+        events = self._events(rec)
+        kernel.run(
+            x, P, self._params(), np.zeros(kernel.W_SIZE),
+            imu.t, imu.gyr, acc, t_mag, field, events, out, diag,
+        )  # fmt: skip
+        rows = _diagnostics(imu.t, diag) if diagnostics else {}
+        return self._solution(rec, imu.t, out, rows), State(self.NAME, x, P)
+
+    def run(self, rec: Recording, *, diagnostics: bool = True) -> Solution:
+        """Estimate over a whole recording: ``advance(init(), rec)[0]``.
+
+        Parameters
+        ----------
+        rec : Recording
+            With all streams that the estimator needs.
+        diagnostics : bool
+            Whether to keep a row per measurement.
+
+        Returns
+        -------
+        Solution
+        """
+        return self.advance(self.init(), rec, diagnostics=diagnostics)[0]
+
+    def step(
+        self,
+        state: State,
+        t: float,
+        gyr: ArrayLike,
+        acc: ArrayLike,
+        mag: ArrayLike | None = None,
+        **aiding: ArrayLike,
+    ) -> State:
+        """Return the state after one more IMU sample; `state` is left as it was.
+
+        Parameters
+        ----------
+        state : State
+            After the sample before.
+        t : float
+            Time [s].
+        gyr, acc : array_like, shape (3,)
+            Angular rate [rad/s] and specific force [m/s^2].
+        mag : array_like, shape (3,), optional
+            Field [T] that came since the last sample.
+        **aiding
+            Other aiding that came, by stream: ``star`` q_nb (4,), ``gnss`` (14,) as
+            (t, lla, v_n, std_position_n, std_velocity_n, heading), ``baro`` [Pa],
+            ``speed`` and ``airspeed`` [m/s].
+
+        Returns
+        -------
+        State
+        """
+        state = self._own(state)
+        if not t > state.t and state.t == state.t:
+            raise ValueError(f"`t` must increase, got {t} after {state.t}.")
+        x, P = state.x.copy(), state.P.copy()
+        if mag is not None:
+            x[_m.MAG] = 1.0
+            x[_m.MAG + 1 : _m.MAG + 4] = _checks.as_vector("mag", mag, allow_nan=True)
+        for name, value in aiding.items():
+            cell, count = _INBOX[_checks.one_of("aiding", name, _INBOX)]
+            x[cell] = 1.0
+            x[cell + 1 : cell + 1 + count] = _checks.as_vector(
+                name, np.atleast_1d(np.asarray(value, dtype=np.float64)), count, allow_nan=True
+            )
+        kernel = self._kernel()
+        gx, gy, gz = _checks.as_vector("gyr", gyr, allow_nan=True).tolist()
+        ax, ay, az = _checks.as_vector("acc", acc, allow_nan=True).tolist()
+        kernel.step(
+            x, P, self._params(), np.zeros(kernel.W_SIZE),
+            _checks.finite("t", t), gx, gy, gz, ax, ay, az,
+        )  # fmt: skip
+        return State(state.name, x, P)
+
+    def tracker(self, state: State | None = None) -> Tracker:
+        """Return the stateful form, for real-time code.
+
+        Parameters
+        ----------
+        state : State, optional
+            Where to begin.
+
+        Returns
+        -------
+        Tracker
+        """
+        return Tracker(self, state)
+
+    def parameters(self) -> dict[str, Any]:
+        """Return the parameters by name."""
+        return {f.name: getattr(self, f.name) for f in fields(self)}  # type: ignore[arg-type]
+
+    def _own(self, state: State) -> State:
+        """Return the state if it is this estimator's; a restored name may be an array."""
+        if str(state.name) != self.NAME:
+            raise ValueError(f"`state` must belong to {self.NAME}, got one of {state.name}.")
+        return State(self.NAME, state.x, state.P)
+
+    def _events(self, rec: Recording) -> FloatArray:
+        """Return the rare aiding that the estimator uses, as rows for `load_events`."""
+        return _NO_EVENTS
+
+    def _heading_reference(self, rec: Recording) -> str:
+        """Return what the heading of a solution is measured from."""
+        return "arbitrary"
+
+    def _solution(
+        self, rec: Recording, t: FloatArray, out: FloatArray, rows: Mapping[str, Diagnostics]
+    ) -> Solution:
+        """Return the solution whose arrays stand in the columns of `out`."""
+        arrays: dict[str, Any] = {}
+        for name in self.OUTPUTS:
+            first = CELLS[name] - _m.STATUS
+            arrays[name] = out[:, first : first + len(COLUMNS[name])]
+        return Solution(
+            t=t,
+            status=out[:, 0].astype(np.int64),
+            filter=self.NAME,
+            causal=True,
+            heading_reference=self._heading_reference(rec),
+            diagnostics=rows,
+            meta={"parameters": self.parameters()},
+            **arrays,
+        )
+
+
+_INBOX: Mapping[str, tuple[int, int]] = {
+    "star": (_m.STAR, 4),
+    "gnss": (_m.GNSS, 14),
+    "baro": (_m.BARO, 1),
+    "speed": (_m.SPEED, 1),
+    "airspeed": (_m.AIRSPEED, 1),
+}
+
+
+def _diagnostics(t: FloatArray, diag: FloatArray) -> dict[str, Diagnostics]:
+    """Return the rows at which there was a measurement, by sensor."""
+    found = {}
+    for name, cell in (("acc", _m.D_ACC), ("mag", _m.D_MAG)):
+        outcome: IntArray = diag[:, cell + 6].astype(np.int64)
+        rows = np.flatnonzero(outcome != _s.NOT_MEASURED)
+        if len(rows):
+            found[name] = Diagnostics(
+                t=t[rows],
+                innovation=diag[rows, cell : cell + 3],
+                sigma=diag[rows, cell + 3 : cell + 6],
+                outcome=outcome[rows],
+                labels=("x", "y", "z"),
+            )
+    return found
+
+
+# --- registry ------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Entry:
+    """What the registry knows of an estimator.
+
+    Attributes
+    ----------
+    name : str
+        What users type.
+    cls : type
+        Its class.
+    needs, uses : tuple of str
+        Streams it cannot do without besides the IMU, and those it takes if present.
+    gives : {'attitude', 'navigation'}
+        What its solution holds.
+    source : str
+        Thesis and section, or paper.
+    cost : str
+        What a sample costs, in words.
+    rank : int
+        Among those whose needs a recording meets, the highest is preferred.
+    """
+
+    name: str
+    cls: type[Estimator]
+    needs: tuple[str, ...]
+    uses: tuple[str, ...]
+    gives: str
+    source: str
+    cost: str
+    rank: int
+
+    @property
+    def smooths(self) -> bool:
+        """Whether it has an offline twin."""
+        return hasattr(self.cls, "smooth")
+
+    @property
+    def summary(self) -> str:
+        """First line of its docstring."""
+        return (self.cls.__doc__ or "").strip().splitlines()[0]
+
+    def is_compiled(self) -> bool:
+        """Whether its kernel runs at once, without compiling first."""
+        return is_compiled(self.cls._kernel().run)
+
+
+_ENTRIES: dict[str, Entry] = {}
+_PROVIDERS = ("strapdown.attitude", "strapdown.navigation")  # they register when imported
+E = TypeVar("E", bound=type[Estimator])
+
+
+def register(
+    *,
+    source: str,
+    cost: str,
+    needs: tuple[str, ...] = (),
+    uses: tuple[str, ...] = (),
+    gives: str = "attitude",
+    rank: int = 0,
+) -> Any:
+    """Return a class decorator that enters an estimator under its ``NAME``.
+
+    Parameters
+    ----------
+    source, cost, needs, uses, gives, rank
+        See `Entry`.
+    """
+
+    def enter(cls: E) -> E:
+        if cls.NAME in _ENTRIES and _ENTRIES[cls.NAME].cls.__qualname__ != cls.__qualname__:
+            raise ValueError(f"`NAME` must be unique, got {cls.NAME!r} twice.")
+        _ENTRIES[cls.NAME] = Entry(
+            name=cls.NAME, cls=cls, needs=needs, uses=uses, gives=gives,
+            source=source, cost=cost, rank=rank,
+        )  # fmt: skip
+        return cls
+
+    return enter
+
+
+def _loaded() -> dict[str, Entry]:
+    """Return the entries after all providers had their say."""
+    for module in _PROVIDERS:
+        _import(module)
+    return _ENTRIES
+
+
+def _import(module: str) -> ModuleType | None:
+    """Import a provider; None if this version does not have it."""
+    try:
+        return import_module(module)
+    except ModuleNotFoundError as error:
+        if error.name != module:
+            raise
+        return None
+
+
+def names() -> tuple[str, ...]:
+    """Return the names of all estimators."""
+    return tuple(sorted(_loaded()))
+
+
+def entries() -> Iterator[Entry]:
+    """Yield what the registry knows of each estimator, by name."""
+    for name in names():
+        yield _ENTRIES[name]
+
+
+def entry(name: str) -> Entry:
+    """Return what the registry knows of `name`.
+
+    Raises
+    ------
+    ValueError
+        If there is none; the nearest name is offered.
+    """
+    if name not in _ENTRIES:
+        _checks.one_of("filter", name, names())
+    return _ENTRIES[name]
+
+
+def create(name: str, **parameters: Any) -> Any:
+    """Return the estimator `name` with the given parameters.
+
+    Parameters
+    ----------
+    name : str
+        As in `names`.
+    **parameters
+        Fields of its dataclass.
+
+    Returns
+    -------
+    Estimator
+
+    Raises
+    ------
+    ValueError
+        If the name or a parameter is not there, or a value is out of range.
+    """
+    cls = entry(name).cls
+    known = [f.name for f in fields(cls)]  # type: ignore[arg-type]
+    for key in parameters:
+        if key not in known:
+            raise ValueError(
+                f"`{key}` must be a parameter of {name} ({', '.join(known)})"
+                f"{_checks.nearest(key, known)}."
+            )
+    return cls(**parameters)
+
+
+def preferred(rec: Recording) -> str:
+    """Return the name of the estimator that suits the streams of a recording best.
+
+    Parameters
+    ----------
+    rec : Recording
+        What there is.
+
+    Returns
+    -------
+    str
+
+    Raises
+    ------
+    MissingStream
+        If the recording has no inertial stream.
+    """
+    rec.need("imu")
+    fit = [e for e in entries() if all(getattr(rec, stream) is not None for stream in e.needs)]
+    if not fit:
+        raise MissingStream("no estimator fits the streams of the recording.")
+    return max(fit, key=lambda e: e.rank).name

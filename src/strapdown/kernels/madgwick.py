@@ -1,0 +1,110 @@
+"""Madgwick's gradient-descent filter. Frames: n = NED, b = body.
+
+Equation numbers are those of spec B (thesis "kinematic", section 4.2). Two things are said
+otherwise here. n is NED, so the measured direction of gravity is ``-f_b / |f_b|``. And the
+gradient (28) is taken along rotations only: its component along the quaternion itself changes
+no attitude, but depends on how (29) is written and spoils the normalisation (48). What is left
+of ``J^T f`` is the cross product of measured and predicted direction, times q.
+"""
+
+from math import inf, sqrt
+
+from strapdown.kernels import status as s
+from strapdown.kernels._jit import Mat, Vec, kernel
+from strapdown.kernels.memory import (
+    BG,
+    D_ACC,
+    D_MAG,
+    GO,
+    MAG,
+    P_COS_D,
+    P_HEAD,
+    P_SIN_D,
+    W_HEAD,
+    Q,
+    advance_attitude,
+    begin,
+    field_in_body,
+    load,
+    note,
+    post,
+    store,
+)
+from strapdown.kernels.quat import down_in_body
+
+P_BETA = P_HEAD  # [rad/s]
+P_ZETA = P_HEAD + 1  # [rad/s^2]
+P_SIZE = P_HEAD + 2
+W_SIZE = W_HEAD
+
+
+# fmt: off
+@kernel
+def step(
+    x: Vec, P: Mat, p: Vec, w: Vec, t: float,
+    gx: float, gy: float, gz: float,
+    ax: float, ay: float, az: float,
+) -> None:
+    """Advance `x` by one sample, in the order of spec B 2.9.5."""
+    # fmt: on
+    todo, dt, wx, wy, wz, has_acc, has_mag = begin(x, p, w, t, gx, gy, gz, ax, ay, az)
+    if todo < GO:
+        return
+    qw, qx, qy, qz = x[Q], x[Q + 1], x[Q + 2], x[Q + 3]
+    ex = ey = ez = 0.0
+    if has_acc:
+        k = -1.0 / sqrt(ax * ax + ay * ay + az * az)  # at rest f_b points up
+        mx, my, mz = k * ax, k * ay, k * az
+        dx, dy, dz = down_in_body(qw, qx, qy, qz)
+        ex, ey, ez = my * dz - mz * dy, mz * dx - mx * dz, mx * dy - my * dx
+        note(w, D_ACC, mx - dx, my - dy, mz - dz, s.ACCEPTED)
+        if has_mag:  # the field alone does not fix an attitude: it joins the accelerometer
+            mx, my, mz = x[MAG + 1], x[MAG + 2], x[MAG + 3]
+            k = 1.0 / sqrt(mx * mx + my * my + mz * mz)
+            mx, my, mz = k * mx, k * my, k * mz
+            dx, dy, dz = field_in_body(qw, qx, qy, qz, mx, my, mz, p[P_COS_D], p[P_SIN_D])  # (49)
+            ex += my * dz - mz * dy
+            ey += mz * dx - mx * dz
+            ez += mx * dy - my * dx
+            note(w, D_MAG, mx - dx, my - dy, mz - dz, s.ACCEPTED)
+        norm2 = ex * ex + ey * ey + ez * ez
+        if norm2 > 0.0:  # (48): twice the unit vector is the rate of a unit quaternion rate
+            k = 2.0 / sqrt(norm2)
+            ex, ey, ez = k * ex, k * ey, k * ez
+    zeta_dt = p[P_ZETA] * dt
+    x[BG] -= zeta_dt * ex  # (50), (51)
+    x[BG + 1] -= zeta_dt * ey
+    x[BG + 2] -= zeta_dt * ez
+    beta = p[P_BETA]
+    advance_attitude(  # (25), (52), (46)-(48)
+        x,
+        (wx - x[BG] + beta * ex) * dt,
+        (wy - x[BG + 1] + beta * ey) * dt,
+        (wz - x[BG + 2] + beta * ez) * dt,
+    )
+
+
+# fmt: off
+@kernel
+def run(
+    x: Vec, P: Mat, p: Vec, w: Vec,
+    t: Vec, gyr: Mat, acc: Mat, t_mag: Vec, mag: Mat, events: Mat,
+    out: Mat, out_diag: Mat,
+) -> None:
+    """Loop of `step` over a recording."""
+    # fmt: on
+    j = 0
+    for k in range(t.shape[0]):
+        j = load(x, t[k], j, t_mag, mag)
+        step(x, P, p, w, t[k], gyr[k, 0], gyr[k, 1], gyr[k, 2], acc[k, 0], acc[k, 1], acc[k, 2])
+        store(x, w, k, out, out_diag)
+    load(x, inf, j, t_mag, mag)
+
+
+@kernel
+def update(x: Vec, P: Mat, p: Vec, w: Vec, t: float, gyr: Vec, acc: Vec, mag: Vec) -> bool:
+    """One `step` from vectors, for real-time code; False if their lengths are wrong."""
+    ok = post(x, gyr, acc, mag)
+    if ok:
+        step(x, P, p, w, t, gyr[0], gyr[1], gyr[2], acc[0], acc[1], acc[2])
+    return ok

@@ -1,0 +1,311 @@
+"""Multiplicative extended Kalman filter: attitude and gyro bias. n = NED, b = body.
+
+Error state ``(dtheta_b, dbg)``: ``q_nb_true = q_nb exp(dtheta_b)``, ``b_g_true = b_g + dbg``.
+`P` is its covariance, 6x6. Measurements enter one scalar at a time in Joseph form.
+"""
+
+from math import inf, pi, sqrt
+
+from strapdown.kernels import status as s
+from strapdown.kernels._jit import Mat, Vec, kernel
+from strapdown.kernels.memory import (
+    ALIGNED,
+    BG,
+    D_ACC,
+    D_MAG,
+    FULL,
+    HEAD,
+    MAG,
+    P_COS_D,
+    P_HEAD,
+    P_SIN_D,
+    SKIP,
+    START,
+    STATUS,
+    STD_ATT,
+    STD_BG,
+    W_HEAD,
+    WIDEN,
+    Q,
+    T,
+    advance_attitude,
+    begin,
+    field_in_body,
+    load,
+    note_sigma,
+    post,
+    set_status,
+    store,
+)
+from strapdown.kernels.quat import dcm, down_in_body, exp
+
+# --- own states of x -------------------------------------------------------------------
+T_ACC = HEAD  # time of the last accelerometer update [s]
+T_MAG = HEAD + 1  # time of the last field update [s]
+X_SIZE = HEAD + 2
+
+# --- own parameters ------------------------------------------------------------------------
+P_GYR_NOISE = P_HEAD  # [rad/s/sqrt(Hz)]
+P_BIAS_NOISE = P_HEAD + 1  # [rad/s^2/sqrt(Hz)]
+P_ACC_NOISE = P_HEAD + 2  # [m/s^2/sqrt(Hz)]
+P_MAG_NOISE = P_HEAD + 3  # [rad/sqrt(Hz)]
+P_GRAVITY = P_HEAD + 4  # [m/s^2]
+P_GATE = P_HEAD + 5  # [sigma]
+P_GAP_RATE = P_HEAD + 6  # [rad/s]
+P_STD_TILT = P_HEAD + 7  # [rad]
+P_STD_HEADING = P_HEAD + 8  # [rad]
+P_SIZE = P_HEAD + 9
+
+# --- scratch -----------------------------------------------------------------------------
+W_A = W_HEAD  # transition of dtheta: 3x3
+W_B = W_HEAD + 9  # influence of dbg on dtheta: 3x3
+W_M = W_HEAD + 18  # A P_tt + B P_bt: 3x3
+W_N = W_HEAD + 27  # A P_tb + B P_bb: 3x3
+W_DX = W_HEAD + 36  # error state found so far in this update: 6
+W_PH = W_HEAD + 42  # P h: 6
+W_SIZE = W_HEAD + 48
+
+
+@kernel
+def transition(w: Vec, phi_x: float, phi_y: float, phi_z: float, dt: float) -> None:
+    """Write ``A = exp(-[phi])`` and ``B = -J_r(phi) dt`` into the scratch.
+
+    J_r is the right Jacobian of the rotation to second order: the first term left out is
+    ``|phi|^3 / 24``.
+    """
+    qw, qx, qy, qz = exp(-phi_x, -phi_y, -phi_z)
+    (
+        w[W_A], w[W_A + 1], w[W_A + 2],
+        w[W_A + 3], w[W_A + 4], w[W_A + 5],
+        w[W_A + 6], w[W_A + 7], w[W_A + 8],
+    ) = dcm(qw, qx, qy, qz)  # fmt: skip
+    phi2 = phi_x * phi_x + phi_y * phi_y + phi_z * phi_z
+    k = dt / 6.0
+    h = dt / 2.0
+    w[W_B] = -dt - k * (phi_x * phi_x - phi2)
+    w[W_B + 1] = -h * phi_z - k * phi_x * phi_y
+    w[W_B + 2] = h * phi_y - k * phi_x * phi_z
+    w[W_B + 3] = h * phi_z - k * phi_x * phi_y
+    w[W_B + 4] = -dt - k * (phi_y * phi_y - phi2)
+    w[W_B + 5] = -h * phi_x - k * phi_y * phi_z
+    w[W_B + 6] = -h * phi_y - k * phi_x * phi_z
+    w[W_B + 7] = h * phi_x - k * phi_y * phi_z
+    w[W_B + 8] = -dt - k * (phi_z * phi_z - phi2)
+
+
+@kernel
+def predict(P: Mat, w: Vec, q_theta: float, q_bias: float) -> None:
+    """``P <- F P F^T + Q`` with ``F = [[A, B], [0, I]]``, by blocks."""
+    for i in range(3):
+        for j in range(3):
+            m = 0.0
+            n = 0.0
+            for k in range(3):
+                m += w[W_A + 3 * i + k] * P[k, j] + w[W_B + 3 * i + k] * P[3 + k, j]
+                n += w[W_A + 3 * i + k] * P[k, 3 + j] + w[W_B + 3 * i + k] * P[3 + k, 3 + j]
+            w[W_M + 3 * i + j] = m
+            w[W_N + 3 * i + j] = n
+    for i in range(3):
+        for j in range(i + 1):
+            v = 0.0
+            for k in range(3):
+                v += w[W_M + 3 * i + k] * w[W_A + 3 * j + k]
+                v += w[W_N + 3 * i + k] * w[W_B + 3 * j + k]
+            if i == j:
+                v += q_theta
+            P[i, j] = v
+            P[j, i] = v
+        for j in range(3):
+            P[i, 3 + j] = w[W_N + 3 * i + j]
+            P[3 + j, i] = w[W_N + 3 * i + j]
+        P[3 + i, 3 + i] += q_bias
+
+
+# fmt: off
+@kernel
+def update_scalar(
+    P: Mat, w: Vec,
+    h0: float, h1: float, h2: float,
+    innovation: float, r: float, gate: float,
+) -> tuple[float, float, bool]:
+    """Joseph update with ``innovation = h . dtheta_b + noise``, variance r.
+
+    Returns the innovation left after what this update has found so far, its variance, and
+    whether it lies within the gate; beyond it the noise is raised until it lies on the gate.
+    """
+    # fmt: on
+    for i in range(6):
+        w[W_PH + i] = P[i, 0] * h0 + P[i, 1] * h1 + P[i, 2] * h2
+    hph = h0 * w[W_PH] + h1 * w[W_PH + 1] + h2 * w[W_PH + 2]
+    left = innovation - h0 * w[W_DX] - h1 * w[W_DX + 1] - h2 * w[W_DX + 2]
+    expected = hph + r
+    variance = expected
+    accepted = left * left <= gate * gate * expected
+    if not accepted:
+        variance = left * left / (gate * gate)
+    for i in range(6):
+        gain_i = w[W_PH + i] / variance
+        w[W_DX + i] += gain_i * left
+        for j in range(i + 1):
+            gain_j = w[W_PH + j] / variance
+            # (I - K h) P (I - K h)^T + K r K^T, written out
+            v = P[i, j] - gain_i * w[W_PH + j] - w[W_PH + i] * gain_j + gain_i * variance * gain_j
+            P[i, j] = v
+            P[j, i] = v
+    return left, expected, accepted
+
+
+# fmt: off
+@kernel
+def update_direction(
+    P: Mat, w: Vec, cell: int,
+    dx: float, dy: float, dz: float,
+    mx: float, my: float, mz: float,
+    r: float, gate: float,
+) -> bool:
+    """Update with the measured unit vector m of a direction d predicted in b.
+
+    ``m = d + d x dtheta_b``, so the rows of H are those of ``[d]``. Diagnostics go to `cell`.
+    """
+    # fmt: on
+    a, va, ok_a = update_scalar(P, w, 0.0, -dz, dy, mx - dx, r, gate)
+    b, vb, ok_b = update_scalar(P, w, dz, 0.0, -dx, my - dy, r, gate)
+    c, vc, ok_c = update_scalar(P, w, -dy, dx, 0.0, mz - dz, r, gate)
+    note_sigma(w, cell, 0, a, va)
+    note_sigma(w, cell, 1, b, vb)
+    note_sigma(w, cell, 2, c, vc)
+    accepted = ok_a and ok_b and ok_c
+    w[cell + 6] = s.ACCEPTED if accepted else s.REJECTED_GATE
+    return accepted
+
+
+@kernel
+def reset_attitude(x: Vec, P: Mat, p: Vec) -> None:
+    """Set the attitude's covariance after an alignment; the bias keeps its own."""
+    c = p[P_STD_TILT] * p[P_STD_TILT]
+    heading = 0.0  # an arbitrary heading is exact by definition
+    if x[ALIGNED] == FULL:
+        heading = p[P_STD_HEADING] * p[P_STD_HEADING]
+    dx, dy, dz = down_in_body(x[Q], x[Q + 1], x[Q + 2], x[Q + 3])
+    for i in range(3):
+        for j in range(6):
+            P[i, j] = 0.0
+            P[j, i] = 0.0
+        P[i, i] = c
+    k = heading - c
+    P[0, 0] += k * dx * dx
+    P[0, 1] += k * dx * dy
+    P[0, 2] += k * dx * dz
+    P[1, 1] += k * dy * dy
+    P[1, 2] += k * dy * dz
+    P[2, 2] += k * dz * dz
+    P[1, 0] = P[0, 1]
+    P[2, 0] = P[0, 2]
+    P[2, 1] = P[1, 2]
+
+
+@kernel
+def write_std(x: Vec, P: Mat) -> None:
+    """Write the standard deviations of attitude, in n, and bias."""
+    c0, c1, c2, c3, c4, c5, c6, c7, c8 = dcm(x[Q], x[Q + 1], x[Q + 2], x[Q + 3])
+    x[STD_ATT] = _axis_std(P, c0, c1, c2)
+    x[STD_ATT + 1] = _axis_std(P, c3, c4, c5)
+    x[STD_ATT + 2] = _axis_std(P, c6, c7, c8)
+    for i in range(3):
+        x[STD_BG + i] = sqrt(P[3 + i, 3 + i])
+
+
+@kernel
+def _axis_std(P: Mat, a: float, b: float, c: float) -> float:
+    v = P[0, 0] * a * a + P[1, 1] * b * b + P[2, 2] * c * c
+    v += 2.0 * (P[0, 1] * a * b + P[0, 2] * a * c + P[1, 2] * b * c)
+    if v < 0.0:  # round-off of a direction known exactly
+        v = 0.0
+    return sqrt(v)
+
+
+@kernel
+def inject(x: Vec, w: Vec) -> None:
+    """Move the error state found into the estimate."""
+    advance_attitude(x, w[W_DX], w[W_DX + 1], w[W_DX + 2])
+    for i in range(3):
+        x[BG + i] += w[W_DX + 3 + i]
+
+
+# fmt: off
+@kernel
+def step(
+    x: Vec, P: Mat, p: Vec, w: Vec, t: float,
+    gx: float, gy: float, gz: float,
+    ax: float, ay: float, az: float,
+) -> None:
+    """Advance `x` and `P` by one sample."""
+    # fmt: on
+    todo, dt, wx, wy, wz, has_acc, has_mag = begin(x, p, w, t, gx, gy, gz, ax, ay, az)
+    if todo == SKIP:
+        return
+    if todo == START:
+        reset_attitude(x, P, p)
+        x[T_ACC] = x[T]
+        x[T_MAG] = x[T]
+        write_std(x, P)
+        return
+    rx, ry, rz = (wx - x[BG]) * dt, (wy - x[BG + 1]) * dt, (wz - x[BG + 2]) * dt
+    advance_attitude(x, rx, ry, rz)
+    q_theta = p[P_GYR_NOISE] * p[P_GYR_NOISE] * dt
+    if todo == WIDEN or (int(x[STATUS]) & s.SATURATED) != 0:
+        unknown = p[P_GAP_RATE] * dt
+        q_theta += min(unknown * unknown, pi * pi)
+    transition(w, rx, ry, rz, dt)
+    predict(P, w, q_theta, p[P_BIAS_NOISE] * p[P_BIAS_NOISE] * dt)
+
+    for i in range(6):
+        w[W_DX + i] = 0.0
+    if has_acc and t > x[T_ACC]:
+        f = sqrt(ax * ax + ay * ay + az * az)
+        k = -1.0 / f  # at rest f_b points up, so -f_b points down
+        dx, dy, dz = down_in_body(x[Q], x[Q + 1], x[Q + 2], x[Q + 3])
+        excess = f - p[P_GRAVITY]  # certainly not gravity: it counts as noise once more
+        r = (p[P_ACC_NOISE] * p[P_ACC_NOISE] / (t - x[T_ACC]) + excess * excess) * k * k
+        if not update_direction(P, w, D_ACC, dx, dy, dz, k * ax, k * ay, k * az, r, p[P_GATE]):
+            set_status(x, s.ACC_REJECTED)
+        x[T_ACC] = t
+    if has_mag and t > x[T_MAG]:
+        mx, my, mz = x[MAG + 1], x[MAG + 2], x[MAG + 3]
+        k = 1.0 / sqrt(mx * mx + my * my + mz * mz)
+        mx, my, mz = k * mx, k * my, k * mz
+        dx, dy, dz = field_in_body(
+            x[Q], x[Q + 1], x[Q + 2], x[Q + 3], mx, my, mz, p[P_COS_D], p[P_SIN_D]
+        )
+        r = p[P_MAG_NOISE] * p[P_MAG_NOISE] / (t - x[T_MAG])
+        if not update_direction(P, w, D_MAG, dx, dy, dz, mx, my, mz, r, p[P_GATE]):
+            set_status(x, s.MAG_REJECTED)
+        x[T_MAG] = t
+    inject(x, w)
+    write_std(x, P)
+
+
+# fmt: off
+@kernel
+def run(
+    x: Vec, P: Mat, p: Vec, w: Vec,
+    t: Vec, gyr: Mat, acc: Mat, t_mag: Vec, mag: Mat, events: Mat,
+    out: Mat, out_diag: Mat,
+) -> None:
+    """Loop of `step` over a recording."""
+    # fmt: on
+    j = 0
+    for k in range(t.shape[0]):
+        j = load(x, t[k], j, t_mag, mag)
+        step(x, P, p, w, t[k], gyr[k, 0], gyr[k, 1], gyr[k, 2], acc[k, 0], acc[k, 1], acc[k, 2])
+        store(x, w, k, out, out_diag)
+    load(x, inf, j, t_mag, mag)
+
+
+@kernel
+def update(x: Vec, P: Mat, p: Vec, w: Vec, t: float, gyr: Vec, acc: Vec, mag: Vec) -> bool:
+    """One `step` from vectors, for real-time code; False if their lengths are wrong."""
+    ok = post(x, gyr, acc, mag)
+    if ok:
+        step(x, P, p, w, t, gyr[0], gyr[1], gyr[2], acc[0], acc[1], acc[2])
+    return ok

@@ -1,0 +1,294 @@
+"""What all estimators share: the layout of their memory, and how a sample enters it.
+
+An estimator remembers one vector `x` and one matrix `P` (empty if it has no covariance). The
+head of `x` is laid out here, the same for all; a filter's own states follow from `HEAD` on.
+`p` holds parameters: the common ones below, then the filter's own from `P_HEAD` on.
+`w` is scratch; its first cells tell what became of the accelerometer and the magnetometer.
+"""
+
+from math import atan2, cos, isinf, isnan, nan, sin, sqrt
+
+from strapdown.kernels import status as s
+from strapdown.kernels._jit import Mat, Vec, kernel
+from strapdown.kernels.quat import exp, from_acc, from_two_vectors, mul, normalize, rotate
+
+# --- head of x -------------------------------------------------------------------------
+T = 0  # time of the last sample used [s], NaN before the first
+STATUS = 1  # bits of `status`
+Q = 2  # q_nb: 4
+BG = 6  # gyro bias [rad/s]: 3
+STD_ATT = 9  # attitude error about north, east, down [rad]: 3
+STD_BG = 12  # [rad/s]: 3
+LLA = 15  # latitude, longitude, height [rad, rad, m]: 3
+V = 18  # v_n [m/s]: 3
+STD_POS = 21  # north, east, down [m]: 3
+STD_V = 24  # [m/s]: 3
+BA = 27  # accelerometer bias [m/s^2]: 3
+STD_BA = 30  # [m/s^2]: 3
+Q_VB = 33  # mount, body to vehicle: 4
+OMEGA = 37  # last valid rate [rad/s]: 3
+DT = 40  # usual sampling interval [s], zero before it is known
+ALIGNED = 41  # NO, TILT, FULL or GIVEN
+MAG = 42  # inbox: fresh?, field [T]: 4
+STAR = 46  # inbox: fresh?, q_nb: 5
+GNSS = 51  # inbox: fresh?, t, lla, v_n, std_position_n, std_velocity_n, heading: 15
+BARO = 66  # inbox: fresh?, pressure [Pa]: 2
+SPEED = 68  # inbox: fresh?, forward speed [m/s]: 2
+AIRSPEED = 70  # inbox: fresh?, airspeed [m/s]: 2
+HEAD = 72
+
+# --- how far alignment is -----------------------------------------------------------------
+NO = 0.0
+TILT = 1.0  # roll and pitch from the accelerometer, heading waits for the first field
+FULL = 2.0
+GIVEN = 3.0  # the user set the attitude
+
+# --- head of p -------------------------------------------------------------------------
+P_MAX_GAP = 0  # [s]
+P_USE_MAG = 1  # 0 or 1
+P_COS_D = 2  # cosine and sine of the declination, the heading of magnetic north
+P_SIN_D = 3
+P_GYR_RANGE = 4  # [rad/s]
+P_ACC_RANGE = 5  # [m/s^2]
+P_REALIGN = 6  # 1: after a gap align again; 0: the filter widens its covariance
+P_HEAD = 7
+
+# --- head of w: diagnostics ---------------------------------------------------------------
+D_ACC = 0  # innovation 3, sigma 3, outcome
+D_MAG = 7  # innovation 3, sigma 3, outcome
+W_HEAD = 14
+
+# --- what `begin` asks of the filter ---------------------------------------------------------
+SKIP = 0  # nothing: no usable sample, or no attitude yet
+START = 1  # attitude was set just now: reset what depends on it
+GO = 2  # propagate by dt, then update
+WIDEN = 3  # propagate over a gap of dt, widen the covariance, then update
+
+# Beyond these a number is a broken sample, not a motion.
+MAX_RATE2 = 1e8  # (10^4 rad/s)^2
+MIN_ACC2 = 1e-12  # (10^-6 m/s^2)^2
+MAX_ACC2 = 1e10  # (10^5 m/s^2)^2
+MIN_MAG2 = 1e-24  # (10^-12 T)^2
+MAX_MAG2 = 1e4  # (100 T)^2
+
+
+@kernel
+def load(x: Vec, t: float, j: int, t_mag: Vec, mag: Mat) -> int:
+    """Put the latest field sample up to time `t` into the inbox; returns the next row."""
+    while j < t_mag.shape[0] and t_mag[j] <= t:
+        x[MAG] = 1.0
+        x[MAG + 1] = mag[j, 0]
+        x[MAG + 2] = mag[j, 1]
+        x[MAG + 3] = mag[j, 2]
+        j += 1
+    return j
+
+
+@kernel
+def load_events(x: Vec, t: float, j: int, events: Mat) -> int:
+    """Put rows (time, cell, count, values...) up to time `t` into their inboxes."""
+    while j < events.shape[0] and events[j, 0] <= t:
+        cell = int(events[j, 1])
+        x[cell] = 1.0
+        for i in range(int(events[j, 2])):
+            x[cell + 1 + i] = events[j, 3 + i]
+        j += 1
+    return j
+
+
+@kernel
+def post(x: Vec, gyr: Vec, acc: Vec, mag: Vec) -> bool:
+    """Check lengths and put one field sample, if not empty, into the inbox."""
+    if gyr.shape[0] != 3 or acc.shape[0] != 3:
+        return False
+    if mag.shape[0] == 3:
+        x[MAG] = 1.0
+        x[MAG + 1] = mag[0]
+        x[MAG + 2] = mag[1]
+        x[MAG + 3] = mag[2]
+        return True
+    return mag.shape[0] == 0
+
+
+@kernel
+def store(x: Vec, w: Vec, k: int, out: Mat, out_diag: Mat) -> None:
+    """Write row `k` of the outputs; `out_diag` may be empty."""
+    for i in range(out.shape[1]):
+        out[k, i] = x[STATUS + i]
+    if out_diag.shape[0] > 0:
+        for i in range(W_HEAD):
+            out_diag[k, i] = w[i]
+
+
+# fmt: off
+@kernel
+def field_in_body(
+    w: float, x: float, y: float, z: float,
+    mx: float, my: float, mz: float,
+    cos_d: float, sin_d: float,
+) -> tuple[float, float, float]:
+    """Predicted field in b: with the dip that is measured, and the heading of the reference.
+
+    So made, the difference to the measured field is one of heading only.
+    """
+    # fmt: on
+    hx, hy, hz = rotate(w, x, y, z, mx, my, mz)
+    h = sqrt(hx * hx + hy * hy)
+    dx, dy, dz = rotate(w, -x, -y, -z, h * cos_d, h * sin_d, hz)
+    return dx, dy, dz
+
+
+@kernel
+def advance_attitude(x: Vec, rx: float, ry: float, rz: float) -> None:
+    """``q_nb <- q_nb exp(r_b)``."""
+    ew, ea, eb, ec = exp(rx, ry, rz)
+    qw, qx, qy, qz = mul(x[Q], x[Q + 1], x[Q + 2], x[Q + 3], ew, ea, eb, ec)
+    x[Q], x[Q + 1], x[Q + 2], x[Q + 3] = normalize(qw, qx, qy, qz)
+
+
+@kernel
+def set_status(x: Vec, bit: int) -> None:
+    """Add a flag to the status word."""
+    x[STATUS] = float(int(x[STATUS]) | bit)
+
+
+@kernel
+def heading_from_mag(x: Vec, cos_d: float, sin_d: float) -> float:
+    """Angle about down that turns the field of the inbox to its heading; NaN if vertical."""
+    hx, hy, hz = rotate(x[Q], x[Q + 1], x[Q + 2], x[Q + 3], x[MAG + 1], x[MAG + 2], x[MAG + 3])
+    h2 = hx * hx + hy * hy
+    angle = atan2(sin_d * hx - cos_d * hy, cos_d * hx + sin_d * hy)
+    if not h2 > 1e-12 * (h2 + hz * hz):
+        angle = nan
+    return angle
+
+
+@kernel
+def turn_heading(x: Vec, angle: float) -> None:
+    """Turn the attitude about down."""
+    x[Q], x[Q + 1], x[Q + 2], x[Q + 3] = mul(
+        cos(0.5 * angle), 0.0, 0.0, sin(0.5 * angle), x[Q], x[Q + 1], x[Q + 2], x[Q + 3]
+    )
+
+
+@kernel
+def _level(x: Vec, ax: float, ay: float, az: float) -> None:
+    """Turn the attitude the short way until the specific force points up."""
+    fx, fy, fz = rotate(x[Q], x[Q + 1], x[Q + 2], x[Q + 3], ax, ay, az)
+    cw, cx, cy, cz = from_two_vectors(fx, fy, fz, 0.0, 0.0, -1.0)
+    w, a, b, c = mul(cw, cx, cy, cz, x[Q], x[Q + 1], x[Q + 2], x[Q + 3])
+    x[Q], x[Q + 1], x[Q + 2], x[Q + 3] = normalize(w, a, b, c)
+
+
+# fmt: off
+@kernel
+def begin(
+    x: Vec, p: Vec, w: Vec, t: float,
+    gx: float, gy: float, gz: float,
+    ax: float, ay: float, az: float,
+) -> tuple[int, float, float, float, float, bool, bool]:
+    """Judge a sample, keep the time, align; tells the filter what to do with it.
+
+    Returns one of SKIP, START, GO, WIDEN; the interval dt; the mean rate over it; and whether
+    accelerometer and magnetometer may be used. An accelerometer sample of inf is absent.
+    """
+    # fmt: on
+    bits = 0
+    w[D_ACC + 6] = s.NOT_MEASURED
+    w[D_MAG + 6] = s.NOT_MEASURED
+    has_acc = not isinf(ax)
+    a2 = ax * ax + ay * ay + az * az
+    if has_acc:
+        if not (a2 > MIN_ACC2 and a2 < MAX_ACC2):
+            has_acc = False
+            bits |= s.ACC_INVALID
+        elif abs(ax) >= p[P_ACC_RANGE] or abs(ay) >= p[P_ACC_RANGE] or abs(az) >= p[P_ACC_RANGE]:
+            has_acc = False
+            bits |= s.SATURATED
+        if not has_acc:
+            w[D_ACC + 6] = s.REJECTED_INVALID
+    has_mag = x[MAG] > 0.0 and p[P_USE_MAG] > 0.0
+    if has_mag:
+        m2 = x[MAG + 1] * x[MAG + 1] + x[MAG + 2] * x[MAG + 2] + x[MAG + 3] * x[MAG + 3]
+        if not (m2 > MIN_MAG2 and m2 < MAX_MAG2):
+            has_mag = False
+            x[MAG] = 0.0
+            bits |= s.MAG_INVALID
+            w[D_MAG + 6] = s.REJECTED_INVALID
+
+    if not gx * gx + gy * gy + gz * gz < MAX_RATE2 or (not t > x[T] and not isnan(x[T])):
+        # No rate: the next valid sample integrates over this one. The field waits in the inbox.
+        bits |= s.GYR_INVALID
+        if x[ALIGNED] == NO:
+            bits |= s.ALIGNING
+        x[STATUS] = float(bits)
+        return SKIP, 0.0, 0.0, 0.0, 0.0, False, False
+    x[MAG] = 0.0
+    if abs(gx) >= p[P_GYR_RANGE] or abs(gy) >= p[P_GYR_RANGE] or abs(gz) >= p[P_GYR_RANGE]:
+        bits |= s.SATURATED
+
+    dt = 0.0
+    wx, wy, wz = gx, gy, gz
+    todo = GO
+    if not isnan(x[T]):
+        dt = t - x[T]
+        usual = x[DT]
+        if dt > p[P_MAX_GAP]:
+            bits |= s.GAP
+            todo = WIDEN
+        elif not 0.5 * usual < dt < 1.5 * usual:
+            if usual == 0.0 or dt < usual:
+                x[DT] = dt
+        else:
+            x[DT] = usual + 0.02 * (dt - usual)
+        if 0.0 < 1.01 * usual < dt:  # samples are missing: their rate is the mean of the two
+            missed = 0.5 * (dt - usual) / dt
+            wx += missed * (x[OMEGA] - gx)
+            wy += missed * (x[OMEGA + 1] - gy)
+            wz += missed * (x[OMEGA + 2] - gz)
+    x[T] = t
+    x[OMEGA] = gx
+    x[OMEGA + 1] = gy
+    x[OMEGA + 2] = gz
+
+    if x[ALIGNED] == NO:
+        todo = SKIP
+        if has_acc:
+            x[Q], x[Q + 1], x[Q + 2], x[Q + 3] = from_acc(ax, ay, az)
+            x[ALIGNED] = TILT
+            todo = START
+    elif todo == WIDEN and p[P_REALIGN] > 0.0:
+        todo = START
+        if has_acc:
+            _level(x, ax, ay, az)
+        if x[ALIGNED] == FULL:
+            x[ALIGNED] = TILT
+    if x[ALIGNED] == TILT and has_mag:
+        angle = heading_from_mag(x, p[P_COS_D], p[P_SIN_D])
+        if not isnan(angle):
+            turn_heading(x, angle)
+            x[ALIGNED] = FULL
+            todo = START
+    if x[ALIGNED] == NO:
+        bits |= s.ALIGNING
+    x[STATUS] = float(bits)
+    return todo, dt, wx, wy, wz, has_acc, has_mag
+
+
+@kernel
+def note(w: Vec, cell: int, ix: float, iy: float, iz: float, outcome: int) -> None:
+    """Write an innovation without stated sigma into the diagnostics."""
+    w[cell] = ix
+    w[cell + 1] = iy
+    w[cell + 2] = iz
+    w[cell + 3] = nan
+    w[cell + 4] = nan
+    w[cell + 5] = nan
+    w[cell + 6] = outcome
+
+
+@kernel
+def note_sigma(w: Vec, cell: int, i: int, innovation: float, variance: float) -> None:
+    """Write component `i` of an innovation and its sigma into the diagnostics."""
+    w[cell + i] = innovation
+    w[cell + 3 + i] = sqrt(variance)

@@ -102,7 +102,7 @@ def gauss_newton(
     history = [x]
     residuals, jacobian = model(x)
     for _ in range(MAX_ITERATIONS):
-        step, _ = _step(residuals, jacobian, scale, names, what, advice)
+        step = _step(residuals, jacobian, scale, names, what, advice)[0]
         cost = residuals @ residuals
         fraction = 1.0
         for _ in range(MAX_HALVINGS):
@@ -121,9 +121,8 @@ def gauss_newton(
             break
     else:
         raise NotConverged(what, MAX_ITERATIONS, float(np.linalg.norm(residuals)), advice)
-    _, singular = _step(residuals, jacobian, scale, names, what, advice)
-    inverse = np.linalg.pinv(jacobian * scale)
-    cofactor = (inverse @ inverse.T) * np.outer(scale, scale)
+    _, singular, right = _step(residuals, jacobian, scale, names, what, advice)
+    cofactor = (right.T / singular**2) @ right * np.outer(scale, scale)
     return Solution(
         x=x,
         cofactor=0.5 * (cofactor + cofactor.T),
@@ -157,13 +156,15 @@ def _step(
     names: tuple[str, ...],
     what: str,
     advice: str,
-) -> tuple[FloatArray, FloatArray]:
-    """Return the step and the singular values of the scaled Jacobian."""
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return the step, and the singular values and right vectors of the scaled Jacobian."""
     if not (np.isfinite(residuals).all() and np.isfinite(jacobian).all()):
         raise NotConverged(what, 0, float("nan"), advice)
-    left, singular, right = np.linalg.svd(jacobian * scale, full_matrices=False)
+    Q, R = np.linalg.qr(jacobian * scale)
+    left, singular, right = np.linalg.svd(R)
     if singular[-1] <= RANK_TOLERANCE * singular[0]:
         weights = np.abs(right[-1])
         blurred = [name for name, w in zip(names, weights, strict=True) if w > 0.3 * weights.max()]
         raise InputError(f"{what} cannot tell {' and '.join(blurred)} from these data; {advice}.")
-    return -scale * (right.T @ ((left.T @ residuals) / singular)), singular
+    step = -scale * (right.T @ ((left.T @ (Q.T @ residuals)) / singular))
+    return step, singular, right

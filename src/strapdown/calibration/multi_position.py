@@ -204,7 +204,7 @@ def _calibrate(
         covariance = solution.covariance(None if std is None else positive("std", std))
         residuals = solution.residuals
     S = distortion_matrix(solution.x)
-    if not (np.diag(S) > 0.1).all():
+    if not ((np.diag(S) > 0.5) & (np.diag(S) < 2.0)).all():
         raise InputError(
             f"{what} must find scale factors near 1, got {np.diag(S).round(3).tolist()}; check "
             f"units and reference, or {_ADVICE}."

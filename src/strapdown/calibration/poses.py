@@ -1,12 +1,14 @@
 """Find the poses of a calibration in one continuous log: hold still, turn, hold still.
 
-Rests come from `strapdown.motion`; here they become poses. A rest in which gravity wanders, as
-it does when the hand tires, is cut to its steadiest part, and two rests that a short jolt
-has split are one pose again.
+Rests come from `strapdown.motion`; here they become poses. How much tremor a rest may have is
+found from the log: on a table none, in the hand ten times the sensor's noise, and one log can
+hold both. So the test runs with several thresholds, and the one that finds most orientations is
+taken. A rest in which gravity wanders, as it does when the hand tires, is cut to its
+steadiest part, and two rests that a short jolt has split are one pose again.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,11 +17,13 @@ from strapdown import motion
 from strapdown._checks import as_samples, as_times, positive, same_length
 from strapdown._types import FloatArray
 from strapdown.calibration.sphere import unit_vectors
-from strapdown.units import DEG
+from strapdown.units import DEG, DPS
 
-HAND_HELD = motion.RestTest()
+HAND_HELD = motion.RestTest(max_gyr_std=10.0 * DPS, max_acc_std=1.0)
 TURNTABLE = motion.RestTest(max_rate=math.inf)
-_JOLT = 1.0  # longest interruption of one pose [s]
+_LOOSENESS = (1.0, 2.0, 4.0, 8.0)  # multiples of the test's factor that are tried
+_JOLT = 3.0  # longest interruption of one pose [s]
+_DISTINCT = 5.0 * DEG  # orientations closer than this count once
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -70,7 +74,8 @@ def find_poses(
     t_mag, mag : array_like, optional
         Time [s], shape (m,), and raw field [T], shape (m, 3).
     rest : RestTest
-        What counts as rest; `TURNTABLE` finds steady rotation too.
+        What counts as rest; `TURNTABLE` finds steady rotation too. Its factor is the
+        strictest one that is tried.
     wander : float
         How far gravity may turn within a pose [rad].
 
@@ -88,10 +93,11 @@ def find_poses(
     acc = as_samples("acc", acc, allow_nan=True)
     same_length(t=t, gyr=gyr, acc=acc)
     positive("wander", wander)
-    found = motion.rest_segments(t, gyr, acc, rest)
-    found = tuple(_steady_part(t, acc, s, rest.window, wander) for s in found)
-    found = tuple(s for s in found if s.duration >= rest.min_duration)
-    joined = _joined(gyr, acc, found, wander)
+    tried = [
+        _pose_segments(t, gyr, acc, replace(rest, factor=k * rest.factor), wander)
+        for k in _LOOSENESS
+    ]
+    joined = max(tried, key=lambda poses: _distinct(acc, poses))  # the strictest of equals
     rows = [np.concatenate([np.arange(s.start, s.stop) for s in pose]) for pose in joined]
     field = None
     if t_mag is not None and mag is not None:
@@ -106,6 +112,25 @@ def find_poses(
         mag=field,
         samples=np.array([float(len(r)) for r in rows]),
     )
+
+
+def _pose_segments(
+    t: FloatArray, gyr: FloatArray, acc: FloatArray, rest: motion.RestTest, wander: float
+) -> list[list[motion.Segment]]:
+    """Return the rests of each pose for one threshold."""
+    found = motion.rest_segments(t, gyr, acc, rest)
+    steady = (_steady_part(t, acc, s, rest.window, wander) for s in found)
+    return _joined(gyr, acc, [s for s in steady if s.duration >= rest.min_duration], wander)
+
+
+def _distinct(acc: FloatArray, poses: list[list[motion.Segment]]) -> int:
+    """Return how many orientations the poses have."""
+    kept: list[FloatArray] = []
+    for pose in poses:
+        (direction,) = unit_vectors("acc", np.nanmean(acc[pose[0].rows], axis=0)[np.newaxis])
+        if all(float(direction @ other) < math.cos(_DISTINCT) for other in kept):
+            kept.append(direction)
+    return len(kept)
 
 
 def _means(samples: FloatArray, rows: list[FloatArray]) -> FloatArray:
@@ -150,7 +175,7 @@ def _steady_part(
 
 
 def _joined(
-    gyr: FloatArray, acc: FloatArray, found: tuple[motion.Segment, ...], wander: float
+    gyr: FloatArray, acc: FloatArray, found: list[motion.Segment], wander: float
 ) -> list[list[motion.Segment]]:
     """Return the rests as poses: those that a jolt has split belong together."""
     poses: list[list[motion.Segment]] = []

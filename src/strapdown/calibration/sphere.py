@@ -5,9 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.spatial import cKDTree
 
 from strapdown._checks import as_samples
-from strapdown._types import FloatArray, IntArray
+from strapdown._types import FloatArray
 from strapdown.errors import InputError
 
 _PROBES = 2000  # directions that are asked for their nearest sample: about 4 deg apart
@@ -76,11 +77,12 @@ def coverage(directions: ArrayLike) -> Coverage:
     if not len(units):
         return Coverage(0.0, math.pi, np.array([0.0, 0.0, 1.0]))
     cells = fibonacci_sphere(min(100, max(12, len(units) // 4)))
-    filled = len(np.unique(_nearest(units, cells)[0]))
+    filled = len(np.unique(cKDTree(cells).query(units)[1]))
     probes = fibonacci_sphere(_PROBES)
-    cosine = _nearest(probes, units)[1]
-    emptiest = int(np.argmin(cosine))
-    return Coverage(filled / len(cells), float(np.arccos(cosine[emptiest])), probes[emptiest])
+    chord = cKDTree(units).query(probes)[0]
+    emptiest = int(np.argmax(chord))
+    hole = 2.0 * math.asin(min(1.0, 0.5 * float(chord[emptiest])))
+    return Coverage(filled / len(cells), hole, probes[emptiest])
 
 
 def direction_name(direction: FloatArray) -> str:
@@ -89,15 +91,3 @@ def direction_name(direction: FloatArray) -> str:
     if abs(direction[k]) > math.cos(math.radians(25.0)):
         return f"{'+' if direction[k] > 0.0 else '-'}{_AXIS_NAMES[k]}"
     return "(" + ", ".join(f"{c:.1f}" for c in direction) + ")"
-
-
-def _nearest(points: FloatArray, among: FloatArray) -> tuple[IntArray, FloatArray]:
-    """Return for each unit vector the row of the nearest one, and the cosine to it."""
-    rows = np.empty(len(points), dtype=np.int64)
-    cosine = np.empty(len(points))
-    step = max(1, 2_000_000 // len(among))  # bounds the memory for long records
-    for k in range(0, len(points), step):
-        product = points[k : k + step] @ among.T
-        rows[k : k + step] = np.argmax(product, axis=1)
-        cosine[k : k + step] = np.max(product, axis=1)
-    return rows, np.clip(cosine, -1.0, 1.0)

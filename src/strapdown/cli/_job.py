@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -141,7 +141,7 @@ def _solution(
 
     with _errors.given(log):
         name = job.filter or estimators.preferred(rec)
-    flt = _estimator(name, job.settings)
+    flt = _to_true_north(_estimator(name, job.settings), rec, progress)
     if job.smooth and not hasattr(flt, "smooth"):
         raise InputError(f"{name} has no offline twin; leave --smooth out, or choose another.")
     progress.step(f"estimating with {name}")
@@ -154,6 +154,20 @@ def _solution(
     if len(sol) == 0:
         raise InputError(f"{log}: the log must hold inertial samples, it has none.")
     return sol
+
+
+def _to_true_north(flt: Any, rec: "Recording", progress: _console.Progress) -> Any:
+    """Return the estimator with the declination of the recording's place and date, if known."""
+    if getattr(flt, "declination", 0.0) is not None or rec.mag is None or not flt.use_mag:
+        return flt
+    from strapdown.attitude import declination
+    from strapdown.units import DEG
+
+    angle = declination(rec)
+    if angle is None:
+        return flt
+    progress.note(f"heading is from true north: declination {angle / DEG:.2f} deg east.")
+    return replace(flt, declination=angle)
 
 
 def _errors_of(
@@ -188,7 +202,7 @@ def _calibrated(rec: "Recording", file: Path) -> "Recording":
 def _print(summary: dict[str, Any]) -> None:
     """Print what one wants to know first."""
     smoothed = "" if summary["causal"] else ", smoothed offline"
-    parameters = _settings.mapping_text(summary["parameters"])
+    parameters = _settings.mapping_text(_changed(summary))
     counts = ", ".join(f"{name} {n}" for name, n in summary["status_counts"].items())
     timing = summary["timing"]
     rows = [
@@ -218,6 +232,15 @@ def _print(summary: dict[str, Any]) -> None:
     print()
     for path in summary["outputs"].values():
         print(path)
+
+
+def _changed(summary: dict[str, Any]) -> dict[str, Any]:
+    """Return the parameters that differ from their defaults."""
+    from strapdown import estimator as estimators
+
+    cls = estimators.entry(summary["filter"]).cls
+    defaults = {f.name: f.default for f in fields(cls)}  # type: ignore[arg-type]
+    return {k: v for k, v in summary["parameters"].items() if v != defaults.get(k)}
 
 
 def _error_rows(errors: dict[str, Any]) -> list[tuple[str, str, str, str]]:

@@ -176,6 +176,15 @@ def test_force_and_field_give_the_whole_attitude(rpy, inclination):
     assert_close(matrix(quat.from_acc_mag(*f_b, *m_b)), C_nb, atol=6 * EPS / np.cos(inclination))
 
 
+@pytest.mark.parametrize("scale", [1e-9, 0.05, 300.0])
+def test_strength_of_force_and_field_does_not_matter(scale):
+    f_b, m_b = np.array([1.0, 2.0, -9.0]), np.array([20.0, -5.0, 40.0])
+    assert_close(quat.from_acc(*(scale * f_b)), quat.from_acc(*f_b), atol=2 * EPS)
+    expected = quat.from_acc_mag(*f_b, *m_b)
+    assert_close(quat.from_acc_mag(*(scale * f_b), *m_b), expected, atol=4 * EPS)
+    assert_close(quat.from_acc_mag(*f_b, *(scale * m_b)), expected, atol=4 * EPS)
+
+
 NOTHING = (0.0, 0.0, 0.0)
 UP = (0.1, 0.2, -9.8)
 

@@ -219,7 +219,7 @@ class _Reader:
         import pyarrow as pa
         from pyarrow import csv
 
-        text, kept = self._clean(block)
+        text, kept = self._clean(_as_utf8(block))
         if not text or text.isspace():
             return
         self._odd.clear()
@@ -402,6 +402,17 @@ def _filled_lines(text: bytes, delimiter: str, width: int) -> NDArray[np.int64]:
         ],
         dtype=np.int64,
     )
+
+
+def _as_utf8(block: bytes) -> bytes:
+    """Return a block that pyarrow can decode: what is no UTF-8 is taken for Latin-1."""
+    if block.isascii():
+        return block
+    try:
+        block.decode()
+    except UnicodeDecodeError:
+        return block.decode("latin-1").encode()
+    return block
 
 
 def _text_blocks(stream: BinaryIO) -> Iterator[bytes]:

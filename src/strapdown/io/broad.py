@@ -167,7 +167,7 @@ def _from_hdf5(path: Path, names: Iterable[str], *, transposed: bool) -> dict[st
     arrays: dict[str, Any] = {}
     try:
         with h5py.File(path, "r") as file:
-            there = [*file, *file.attrs]
+            there = [str(name) for name in (*file, *file.attrs)]
             for name in names:
                 if name in file:
                     value = np.asarray(file[name][()])

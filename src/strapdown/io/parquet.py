@@ -18,6 +18,7 @@ from typing import IO, Any, Final
 
 import numpy as np
 
+from strapdown import _checks
 from strapdown._types import FloatArray
 from strapdown.errors import FormatError, InputError
 from strapdown.io._assemble import assemble
@@ -26,6 +27,7 @@ from strapdown.io._options import Options
 from strapdown.io._raw import Column, Finding, RawLog, Table
 from strapdown.io._text import unreadable
 from strapdown.recording import REFERENCE_STREAMS, STREAMS, Recording, Reference, Stream
+from strapdown.solution import HEADING_REFERENCES
 from strapdown.units import parse_unit
 
 NAME: Final = "parquet"
@@ -36,6 +38,7 @@ TAKES: Final = frozenset(("columns", "units", "rate"))
 KEY: Final = b"strapdown"
 VERSION: Final = 1
 _ROWS: Final = 1 << 20  # rows of a row group
+_BATCH: Final = 1 << 16  # rows in memory beside the arrays while reading
 _KINDS: Final[Mapping[str, type[Stream]]] = {
     **STREAMS,
     **{f"reference.{name}": kind for name, kind in REFERENCE_STREAMS.items()},
@@ -62,7 +65,7 @@ def open_file(path: Path) -> Any:
     from pyarrow import parquet
 
     try:
-        return parquet.ParquetFile(path)
+        return parquet.ParquetFile(path, pre_buffer=False, page_checksum_verification=True)
     except (pa.ArrowException, OSError, ValueError) as error:
         if isinstance(error, (FileNotFoundError, PermissionError)):
             raise unreadable(path, error) from None
@@ -93,6 +96,8 @@ def header_of(file: Any, path: Path, kind: str) -> dict[str, Any] | None:
     try:
         header = json.loads(text)
         version, found = int(header["format_version"]), str(header["kind"])
+        dict(header["meta"])
+        _checks.one_of("heading", header.get("reference_heading", "true"), HEADING_REFERENCES)
     except (ValueError, KeyError, TypeError) as error:
         raise damaged(path, error) from None
     if version > VERSION:
@@ -152,6 +157,8 @@ def read(path: Path, options: Options) -> tuple[Recording, RawLog]:
             streams[name] = _KINDS[name](t=t, **fields)  # type: ignore[call-arg]
         except ValueError as error:
             raise FormatError(str(error), file=path, stream=name) from None
+        except TypeError as error:  # a stream without a field that it needs
+            raise damaged(path, error) from None
     parts = {name: streams.pop(f"reference.{name}", None) for name in REFERENCE_STREAMS}
     reference = (
         Reference(**parts, heading=header.get("reference_heading", "true"))
@@ -164,7 +171,7 @@ def read(path: Path, options: Options) -> tuple[Recording, RawLog]:
 def _streams(
     file: Any, header: Mapping[str, Any], path: Path
 ) -> Iterator[tuple[str, FloatArray, dict[str, Any]]]:
-    """Yield name, times and arrays of each stream, one row group in memory at a time."""
+    """Yield name, times and arrays of each stream, read batch by batch."""
     import pyarrow as pa
 
     try:
@@ -181,15 +188,14 @@ def _streams(
                 fields[spec.name] = np.empty(shape, np.bool_ if spec.kind == "flag" else float)
             columns = ["t_s", *(column for spec in specs for column in spec.columns)]
             start = 0
-            for group in groups:
-                table = file.read_row_group(group, columns=columns)
-                rows = slice(start, start + table.num_rows)
-                t[rows] = _numbers(table, "t_s")
+            for batch in file.iter_batches(_BATCH, row_groups=groups, columns=columns):
+                rows = slice(start, start + batch.num_rows)
+                t[rows] = _numbers(batch, "t_s")
                 for spec in specs:
                     out = fields[spec.name]
                     for j, column in enumerate(spec.columns):
-                        (out if out.ndim == 1 else out[:, j])[rows] = _numbers(table, column)
-                start += table.num_rows
+                        (out if out.ndim == 1 else out[:, j])[rows] = _numbers(batch, column)
+                start += batch.num_rows
             if start != n:
                 raise ValueError(f"stream {name} has {start} rows, {n} were written")
             yield name, t, fields
@@ -199,8 +205,8 @@ def _streams(
         raise damaged(path, error) from None
 
 
-def _numbers(table: Any, column: str) -> Any:
-    return table.column(column).to_numpy()
+def _numbers(batch: Any, column: str) -> Any:
+    return batch.column(column).to_numpy(zero_copy_only=False)
 
 
 def _foreign_table(file: Any, path: Path, options: Options, findings: list[Finding]) -> Table:
@@ -288,7 +294,12 @@ def save(rec: Recording, path: Path, stream: IO[bytes]) -> None:
         metadata={KEY: text},
     )
     with parquet.ParquetWriter(
-        stream, schema, compression="zstd", compression_level=1, use_dictionary=["stream"]
+        stream,
+        schema,
+        compression="zstd",
+        compression_level=1,
+        use_dictionary=["stream"],
+        write_page_checksum=True,
     ) as writer:
         for name, part in parts.items():
             for start in range(0, len(part), _ROWS):

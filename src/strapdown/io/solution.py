@@ -69,7 +69,12 @@ def write_solution(sol: Solution, path: str | PathLike[str]) -> None:
     table = table.replace_schema_metadata({KEY: as_json(header, target)})
     with written_aside(target) as stream:
         parquet.write_table(
-            table, stream, compression="zstd", compression_level=1, use_dictionary=False
+            table,
+            stream,
+            compression="zstd",
+            compression_level=1,
+            use_dictionary=False,
+            write_page_checksum=True,
         )
 
 

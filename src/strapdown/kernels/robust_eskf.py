@@ -18,9 +18,10 @@ from strapdown.kernels.memory import (
     DT,
     HEAD,
     MAG,
-    P_DECLINATION,
+    P_COS_D,
     P_GYR_RANGE,
     P_HEAD,
+    P_SIN_D,
     SKIP,
     START,
     STD_ATT,
@@ -99,7 +100,11 @@ DRIFT = QUIET + 1  # low-passed velocity over its deviation: 3
 FLAGS = DRIFT + 3  # status bits of the last interval
 ACC_HELD = FLAGS + 1  # last specific force, for sensors slower than the gyro: 3
 HAS_HELD = ACC_HELD + 3
-STARTED = HAS_HELD + 1
+ASTRAY = HAS_HELD + 1  # low-passed heading innovation in a field of the usual strength [rad]
+LARGEST = ASTRAY + 1  # rate of largest magnitude so far, one axis [rad/s]
+REPEATED = LARGEST + 1  # how often the largest component has repeated to the last bit
+LAST_GYR = REPEATED + 1  # last sample: 3
+STARTED = LAST_GYR + 3
 X_SIZE = STARTED + 1
 
 # --- w: scratch, and the record of a closed interval that the smoother reads ---------------------
@@ -126,6 +131,11 @@ REST_RATE = 3.5e-4  # mean rate at rest, bias apart [rad/s]
 TILT_STD = 0.1  # of an attitude levelled from one sample [rad]
 HEADING_STD = 0.3  # of a heading from one sample of the field [rad]
 LOST = 10.0  # deviations of the mean velocity that no motion explains
+LOST_HEADING = 0.5  # mean heading innovation that no room explains [rad]
+LOST_TIME = 5.0  # over which it is the mean [s]
+CLIPPED_RATE = 0.5  # the largest rate so far, if above this [rad/s] and ...
+CLIPPED_COUNT = 3.0  # ... repeated so often to the last bit, is the end of the range
+CLIPPED_TIME = 0.25  # how long an unseen rate lasts [s]
 DISTURBED = 10.0  # deviations of the field that the flag tells
 
 
@@ -255,11 +265,8 @@ def _heading(x: Vec, P: Mat, p: Vec, w: Vec) -> int:
     usual = p[P_MAG_STD] * p[P_MAG_STD]
     tails = p[P_TAILS]
     variance = (tails * usual + off2) / (tails + 2.0)
-    z = p[P_DECLINATION] - atan2(me, mn)
-    if z > 3.141592653589793:
-        z -= 6.283185307179586
-    elif z < -3.141592653589793:
-        z += 6.283185307179586
+    c, d = p[P_COS_D], p[P_SIN_D]
+    z = atan2(d * mn - c * me, c * mn + d * me)
     r = variance / (x[USUAL] * x[USUAL])
     d = z - w[ERROR + PHI + 2]
     r *= heavy_tail(tails + 2.0, d * d / (P[PHI + 2, PHI + 2] + r))
@@ -269,6 +276,11 @@ def _heading(x: Vec, P: Mat, p: Vec, w: Vec) -> int:
     note_sigma(w, D_MAG, 1, d * x[USUAL], (P[PHI + 2, PHI + 2] + r) * x[USUAL] * x[USUAL])
     note_sigma(w, D_MAG, 2, dd, variance)
     w[D_MAG + 6] = s.ACCEPTED
+    if off2 < DISTURBED * DISTURBED * usual:
+        x[ASTRAY] += min(1.0, x[SINCE_MAG] / LOST_TIME) * (z - x[ASTRAY])
+    if abs(x[ASTRAY]) > LOST_HEADING:  # the gyro has missed a turn
+        P[PHI + 2, PHI + 2] += x[ASTRAY] * x[ASTRAY]
+        x[ASTRAY] = 0.0
     # with more delay than assumed the field stood back by its turning
     h_lag = (turn_n * me - turn_e * mn) / h2
     _measure(P, w, PHI + 2, h_lag, z, r * lasting)
@@ -401,6 +413,27 @@ def _begin_interval(
         w[R_RESET_T] = x[T]
         w[R_TURN] += c3
     x[ATT], x[ATT + 1], x[ATT + 2], x[ATT + 3] = q0, q1, q2, q3
+
+
+@kernel
+def _is_clipped(x: Vec, p: Vec, gx: float, gy: float, gz: float) -> bool:
+    """Whether the gyro is at the end of its range, declared or shown by repeated extremes."""
+    top = max(abs(gx), max(abs(gy), abs(gz)))
+    repeated = (
+        (gx == x[LAST_GYR] and abs(gx) == top)
+        or (gy == x[LAST_GYR + 1] and abs(gy) == top)
+        or (gz == x[LAST_GYR + 2] and abs(gz) == top)
+    )
+    x[LARGEST] = max(x[LARGEST], top)
+    if repeated and top == x[LARGEST]:
+        x[REPEATED] += 1.0
+    else:
+        x[REPEATED] = 0.0
+    x[LAST_GYR], x[LAST_GYR + 1], x[LAST_GYR + 2] = gx, gy, gz
+    clipped = top >= p[P_GYR_RANGE]
+    if top > CLIPPED_RATE and x[REPEATED] >= CLIPPED_COUNT:
+        clipped = True
+    return clipped
 
 
 # fmt: off
@@ -537,8 +570,9 @@ def step(
     missing = dt - x[DT]
     if missing > 0.5 * x[DT]:  # variance of a random walk of the rate between its two ends
         x[EXTRA] += p[P_RATE_WALK] * p[P_RATE_WALK] * missing * missing * missing / 12.0
-    if max(abs(gx), max(abs(gy), abs(gz))) >= p[P_GYR_RANGE]:  # the rate may be much higher
-        x[EXTRA] += dt * dt * (gx * gx + gy * gy + gz * gz)
+    if _is_clipped(x, p, gx, gy, gz):  # the rate may be much higher
+        x[EXTRA] += CLIPPED_TIME * dt * (gx * gx + gy * gy + gz * gz)
+        set_status(x, s.SATURATED)
 
     if has_mag:
         mx, my, mz = x[MAG + 1], x[MAG + 2], x[MAG + 3]

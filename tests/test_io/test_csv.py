@@ -250,6 +250,25 @@ def test_gyroscope_and_accelerometer_on_rows_of_their_own_are_merged(write_text:
     assert np.array_equal(rec.imu.t, table[1:, 0])  # the first has no accelerometer yet
 
 
+def test_a_receiver_that_repeats_a_fix_now_and_then_is_not_thinned(write_text: Write) -> None:
+    text = [f"{line},47.{k - k % 3 // 2},8.5,400" for k, line in enumerate(rows(six_axes(60)))]
+    rec = sd.read(write_text("t,gx,gy,gz,ax,ay,az,lat_deg,lon_deg,alt_m", *text))
+    assert len(rec.gnss) == 60
+
+
+def test_temperatures_have_a_zero_of_their_own(write_text: Write) -> None:
+    text = [f"{line},{77 + k},{298.15 + k}" for k, line in enumerate(rows(six_axes()))]
+    rec = sd.read(write_text("t,gx,gy,gz,ax,ay,az,temp_degf,hot_k", *text))
+    np.testing.assert_allclose(rec.temperature.temp_degc[[0, 9]], [25.0, 30.0], rtol=1e-14)
+
+
+def test_sorting_keeps_the_first_of_repeated_times(write_text: Write) -> None:
+    table = six_axes(1000)
+    table[:, 0] = np.repeat(table[::4, 0], 4)
+    rec = sd.read(write_text("t_s,gx,gy,gz,ax,ay,az", *rows(table)), repair_time="sort")
+    assert np.array_equal(rec.imu.gyr, table[::4, 1:4])
+
+
 def test_up_becomes_down_and_1e7_degrees_become_radians(write_text: Write) -> None:
     text = [
         f"{line},471234567,{85000000 + k},400000,1,2,0.5"

@@ -1,5 +1,6 @@
 """A long text log is read in blocks: little more than its arrays is in memory."""
 
+import gzip
 import subprocess
 import sys
 from pathlib import Path
@@ -10,7 +11,8 @@ import pytest
 from pyarrow import csv
 
 ROWS = 1_000_000
-NAMES = "t_s gx_dps gy_dps gz_dps ax_g ay_g az_g mx_ut my_ut mz_ut".split(" ")
+HEAD = "t_s gx_dps gy_dps gz_dps ax_g ay_g az_g mx_ut my_ut mz_ut"
+NAMES = HEAD.split(" ")
 READ = """
 import sys
 import pyarrow.csv
@@ -41,9 +43,10 @@ def test_the_peak_stays_below_two_and_a_half_times_the_arrays(tmp_path: Path, na
         }
     )
     if name.endswith(".gz"):
-        table = table.slice(0, ROWS // 2)
-    with pa.output_stream(tmp_path / name) as stream:
-        csv.write_csv(table, stream)
+        with gzip.open(tmp_path / name, "wb", compresslevel=1) as stream:
+            csv.write_csv(table, stream)
+    else:
+        csv.write_csv(table, tmp_path / name)
     done = subprocess.run(
         [sys.executable, "-c", READ, str(tmp_path / name)], capture_output=True, text=True
     )

@@ -27,10 +27,11 @@ class Mekf(AttitudeEstimator):
 
     State: q_nb and gyro bias; error state ``(dtheta_b, dbg)`` with
     ``q_nb_true = q_nb exp(dtheta_b)``. The bias is a random walk. Directions of gravity and
-    field enter as three scalars each, in Joseph form; the field's reference takes the measured
-    dip, so that it corrects the heading only. What the specific force exceeds gravity by counts
-    as additional noise. An innovation beyond `gate` sigma is weighted down until it lies on the
-    gate, and flagged: its pull is bounded, and the filter always recovers.
+    field enter as three scalars each, in Joseph form. The specific force is scaled by gravity,
+    not normalised, so that linear accelerations average out. The field's reference takes the
+    measured dip, so that it corrects the heading only. An innovation beyond `gate` sigma is
+    weighted down until it lies on the gate, and flagged: its pull is bounded, and the filter
+    always recovers.
 
     Parameters
     ----------
@@ -68,15 +69,15 @@ class Mekf(AttitudeEstimator):
     Examples
     --------
     >>> from strapdown.simulation import demo
-    >>> sol = Mekf(acc_noise=0.5).run(demo.recording())
+    >>> sol = Mekf(acc_noise=1.0).run(demo.recording())
     """
 
     NAME: ClassVar[str] = "mekf"
     OUTPUTS: ClassVar[tuple[str, ...]] = ("q_nb", "gyr_bias", "std_attitude_n", "std_gyr_bias")
     gyr_noise: float = 3e-4
     gyr_bias_noise: float = 3e-5
-    acc_noise: float = 1.0
-    mag_noise: float = 0.5
+    acc_noise: float = 1.5
+    mag_noise: float = 0.25
     std_tilt: float = 5.0 * DEG
     std_heading: float = 10.0 * DEG
     std_gyr_bias: float = 1.0 * DEG

@@ -262,11 +262,11 @@ def step(
     for i in range(6):
         w[W_DX + i] = 0.0
     if has_acc and t > x[T_ACC]:
-        f = sqrt(ax * ax + ay * ay + az * az)
-        k = -1.0 / f  # at rest f_b points up, so -f_b points down
+        # At rest f_b points up, so -f_b points down. It is scaled, not normalised: a linear
+        # acceleration then adds a zero-mean error, where a normalised one would bend it.
+        k = -1.0 / p[P_GRAVITY]
         dx, dy, dz = down_in_body(x[Q], x[Q + 1], x[Q + 2], x[Q + 3])
-        excess = f - p[P_GRAVITY]  # certainly not gravity: it counts as noise once more
-        r = (p[P_ACC_NOISE] * p[P_ACC_NOISE] / (t - x[T_ACC]) + excess * excess) * k * k
+        r = k * k * p[P_ACC_NOISE] * p[P_ACC_NOISE] / (t - x[T_ACC])
         if not update_direction(P, w, D_ACC, dx, dy, dz, k * ax, k * ay, k * az, r, p[P_GATE]):
             set_status(x, s.ACC_REJECTED)
         x[T_ACC] = t

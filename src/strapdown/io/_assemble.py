@@ -77,7 +77,7 @@ def _build_imu(imu: dict[str, Part], raw: RawLog) -> recording.Imu:
                 file=imu[here].table.file,
                 stream=other,
                 hint=f"give its file with {other}=FILE, or its columns with "
-                f'columns={{"{other}_x": "name", ...}}',
+                f"--columns {other}_x=NAME,...",
             )
     gyr, acc = imu["gyr"], imu["acc"]
     gyr_fields, acc_fields = fields_of(gyr), fields_of(acc)

@@ -62,7 +62,7 @@ def axis_of(
                 fault=True,
                 file=table.file,
                 hint="state the rate with --rate HZ (rate=100), or the column with "
-                'columns={"t": "name"}',
+                '--columns t=NAME (columns={"t": "NAME"})',
             )
         )
         return None
@@ -181,7 +181,7 @@ def common_origin(axes: Iterable[Axis], findings: list[Finding], file: str) -> i
                 what="all files must have one clock, some hold dates and some do not",
                 fault=True,
                 file=file,
-                hint="choose the time column of each with columns=",
+                hint="choose the time column of each with --columns t=NAME",
             )
         )
         return None

@@ -235,7 +235,7 @@ def _scalar(words: list[str]) -> tuple[str, list[str]] | None:
     if known & {"bias", "std", "sigma", "var", "variance", "accuracy", "error", "offset"}:
         return None
     for role, spellings in (
-        ("pressure", {"pressure", "press", "pres", "baro", "barometer"}),
+        ("pressure", {"pressure", "press", "baro", "barometer"}),
         ("airspeed", {"airspeed", "tas", "ias", "eas"}),
         ("temp", {"temp", "temperature", "thermometer"}),
         ("angle", {"encoder"}),

@@ -17,10 +17,10 @@ from strapdown.units import parse_unit, units_of
 _DIALECTS: Final[tuple[tuple[str, str, dict[str, str]], ...]] = (
     (
         "PX4",
-        r"gyro_rad\[0\]|accelerometer_m_s2\[0\]|magnetometer_ga\[0\]|timestamp_sample|device_id",
+        r"gyro_rad\[0\]|accelerometer_m_s2\[0\]|magnetometer_ga\[0\]|timestamp_sample",
         {"time": "us"},
     ),
-    ("MAVLink", r"xacc|xgyro|xmag", {"gyr": "mrad_s", "acc": "mg", "mag": "mgauss"}),
+    ("MAVLink", r"time_boot_ms|time_usec", {"gyr": "mrad_s", "acc": "mg", "mag": "mgauss"}),
     ("ArduPilot", r"TimeUS", {"gyr": "rad_s", "acc": "m_s2", "mag": "mgauss"}),
     ("Sensor Logger", r"seconds_elapsed", {"mag": "ut", "baro": "hpa"}),
 )

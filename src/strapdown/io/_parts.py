@@ -83,8 +83,8 @@ def _nothing_known(raw: RawLog) -> Finding:
         + (f", found {', '.join(names)[:200]}" if names else ""),
         fault=True,
         file=raw.file,
-        hint='say what the columns are with columns={"t": "name", "gyr_x": "name", ...}, '
-        "or name them like t_s, gyr_x_dps, acc_x_g, mag_x_ut",
+        hint="say what the columns are with --columns t=NAME,gyr_x=NAME,... "
+        '(columns={"t": "NAME", ...}), or name them like t_s, gyr_x_dps, acc_x_g, mag_x_ut',
     )
 
 
@@ -110,7 +110,7 @@ def _parts_of(
                 fault=not height,
                 file=table.file,
                 stream=group,
-                hint=None if height else "name the others with the option columns",
+                hint=None if height else "name the others with --columns (columns={...})",
             )
         )
         del groups[group]

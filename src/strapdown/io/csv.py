@@ -150,7 +150,8 @@ def _meanings(
                 what=f"the file has no header, only {len(layout.names)} columns of numbers",
                 fault=True,
                 file=str(path),
-                hint='say what they are with columns={"t": 0, "gyr_x": 1, ...}',
+                hint="say what they are with --columns t=0,gyr_x=1,... "
+                '(columns={"t": 0, "gyr_x": 1, ...})',
             )
         )
     return meanings_of(path, layout.names, options, findings)

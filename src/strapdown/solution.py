@@ -104,6 +104,8 @@ class Solution:
         Standard deviations north, east, down [m], [m/s].
     q_vb : ndarray, shape (n, 4), optional
         Mount: body to vehicle forward-right-down.
+    antenna_b : ndarray, shape (n, 3), optional
+        From the IMU to the GNSS antenna, in b [m], where it is estimated.
     diagnostics : mapping of str to Diagnostics
         By measurement, empty when switched off.
     meta : mapping
@@ -126,6 +128,7 @@ class Solution:
     std_position_n: FloatArray | None = None
     std_velocity_n: FloatArray | None = None
     q_vb: FloatArray | None = None
+    antenna_b: FloatArray | None = None
     diagnostics: Mapping[str, Diagnostics] = field(default_factory=dict)
     meta: Mapping[str, Any] = field(default_factory=dict)
 
@@ -220,6 +223,7 @@ COLUMNS: Mapping[str, tuple[str, ...]] = {
     "lla": ("lat_rad", "lon_rad", "height_m"),
     "v_n": ("v_n_m_s", "v_e_m_s", "v_d_m_s"),
     "q_vb": ("q_vb_w", "q_vb_x", "q_vb_y", "q_vb_z"),
+    "antenna_b": ("antenna_x_m", "antenna_y_m", "antenna_z_m"),
     "gyr_bias": ("gyr_bias_x_rad_s", "gyr_bias_y_rad_s", "gyr_bias_z_rad_s"),
     "acc_bias": ("acc_bias_x_m_s2", "acc_bias_y_m_s2", "acc_bias_z_m_s2"),
     "std_attitude_n": ("std_att_n_rad", "std_att_e_rad", "std_att_d_rad"),

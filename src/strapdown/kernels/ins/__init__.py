@@ -1,0 +1,1 @@
+"""Kernels of the loosely coupled GNSS/INS filter `strapdown.navigation.LooselyCoupled`."""

@@ -1,0 +1,186 @@
+"""Where things stand in the vectors of the GNSS/INS filter.
+
+``x`` is all that the filter remembers besides its covariance ``P``, ``p`` its parameters, ``w``
+scratch with an optional tape for the smoother. The head of ``x`` holds what the filter says
+(`kernels.memory`); its own estimates follow. The error state stands in the order phi_n, dv_n,
+dp_n, db_g, db_a, then the optional blocks, whose first index is in ``p`` (-1 where one is off).
+``dx`` is what has to be added to the estimate; the attitude error is a small rotation in n:
+``q_true = exp(phi_n) q_nb``.
+"""
+
+from strapdown.kernels.memory import GNSS, HEAD, P_HEAD, W_HEAD
+
+# --- x: estimates ----------------------------------------------------------------------
+Q = HEAD  # q_nb: 4
+BG = HEAD + 4  # gyro bias, b [rad/s]: 3
+BA = HEAD + 7  # accelerometer bias, b [m/s^2]: 3
+LLA = HEAD + 10  # latitude, longitude, height of the IMU [rad, rad, m]: 3
+V = HEAD + 13  # velocity over ground, NED [m/s]: 3
+SG = HEAD + 16  # gyro scale error: 3
+SA = HEAD + 19  # accelerometer scale error: 3
+QVB = HEAD + 22  # mount, body to vehicle: 4
+ARM_V = HEAD + 26  # IMU to the point without side slip, along the vehicle's x axis [m]
+ARM_A = HEAD + 27  # IMU to the antenna, b [m]: 3
+DELAY = HEAD + 30  # how much later the receiver's clock reads than the IMU's [s]
+BP = HEAD + 31  # slowly varying error of the fixes' position, NED [m]: 3
+SODO = HEAD + 34  # scale error of the wheel speed
+BARO = HEAD + 35  # pressure height less height [m]
+K_POS = HEAD + 36  # learned scale of the fixes' slow error
+K_WHITE = HEAD + 37  # learned scale of the fixes' fast error
+K_VEL = HEAD + 38  # learned scale of the receiver's velocity sigma
+FIX_SD = HEAD + 39  # position sigma of the last fix, NED [m]: 3
+# --- x: slow quantities ----------------------------------------------------------------
+ACC_N = HEAD + 42  # smoothed acceleration over ground, NED [m/s^2]: 3
+RATE = HEAD + 45  # smoothed angular rate less bias, b [rad/s]: 3
+# --- x: sums since the last covariance step, DT first ----------------------------------
+DT = HEAD + 48  # time [s]
+S_C = HEAD + 49  # sum of C_nb dt: 9
+S_CW = HEAD + 58  # sum of C_nb diag(omega) dt: 9
+S_F = HEAD + 67  # sum of f_n dt: 3
+S_CF = HEAD + 70  # sum of C_nb diag(f) dt: 9
+N_SUMS = 31
+# --- x: the Earth here -----------------------------------------------------------------
+GRAVITY = HEAD + 79  # [m/s^2]
+W_IN = HEAD + 80  # omega_in_n [rad/s]: 3
+W_COR = HEAD + 83  # 2 omega_ie_n + omega_en_n [rad/s]: 3
+R_N = HEAD + 86  # metres per radian of latitude
+R_E = HEAD + 87  # metres per radian of longitude
+# --- x: rest test ----------------------------------------------------------------------
+RING = HEAD + 88  # five blocks of 13 sums: count, rate 3, force 3, their squares 6: 65
+RING_BLOCK = 13
+BLOCK_DT = HEAD + 153  # time in the block that fills [s]
+AT_REST = HEAD + 154  # 1 while the whole window is quiet
+# --- x: alignment ----------------------------------------------------------------------
+MODE = HEAD + 155  # 0 aligning, 1 navigating
+AB = HEAD + 156  # attitude profile matrix B, rows n, columns b of now: 9
+A_SQUARES = HEAD + 165  # weighted sum of |alpha|^2 + |beta|^2
+A_Q = HEAD + 166  # rotation since the last fix: 4
+A_F = HEAD + 170  # specific force summed in b of the last fix [m/s]: 3
+A_DT = HEAD + 173  # time since that fix [s]
+A_FIX = HEAD + 174  # 1 once there was a fix
+A_V = HEAD + 175  # velocity of that fix, NED [m/s]: 3
+A_LLA = HEAD + 178  # position of that fix: 3
+A_COUNT = HEAD + 181  # number of fixes, faded
+A_VAR = HEAD + 182  # variance of heading that alignment has reached [rad^2]
+A_REST = HEAD + 183  # blocks of rest that the gyro bias was averaged over
+# --- x: mount --------------------------------------------------------------------------
+MOUNTED = HEAD + 184  # 1 once the mount is found
+M_SUM = HEAD + 185  # sum of unit vectors of travel in b: 3
+M_COUNT = HEAD + 188  # number of them
+M_BACK = HEAD + 189  # time of travelling backwards fast [s]
+# --- x: bookkeeping of fixes -----------------------------------------------------------
+T_POS = HEAD + 190  # time of the last position taken [s]
+T_VEL = HEAD + 191  # time of the last velocity taken [s]
+FIX_SPEED = HEAD + 192  # horizontal speed of the last fix [m/s]
+FIX_T = HEAD + 193  # its time [s]; NaN before the first
+JUMP = HEAD + 194  # innovation of the last rejected position, NED [m]: 3
+JUMPS = HEAD + 197  # rejected positions in a row that agree with each other
+D_LAST = HEAD + 198  # normalised innovation of the last position, NED: 3
+RHO = HEAD + 201  # correlation of one with the next, averaged
+LAST_F = HEAD + 202  # last specific force, where the accelerometer is slower: 3
+X_SIZE = HEAD + 205
+# --- x: the inbox of fixes, in the head -----------------------------------------------------
+IN_T = GNSS + 1  # its time [s]
+IN_LLA = GNSS + 2
+IN_V = GNSS + 5
+IN_SP = GNSS + 8  # sigma of position, NED: 3
+IN_SV = GNSS + 11  # sigma of velocity, NED: 3
+
+# --- error state ---------------------------------------------------------------------------
+PHI = 0
+DV = 3
+DP = 6
+DBG = 9
+DBA = 12
+CORE = 15
+MAX_N = 34
+
+# --- p: size and optional blocks -------------------------------------------------------
+N = P_HEAD  # length of the error state
+M = P_HEAD + 1  # 15, or 21 with scale errors
+I_MOUNT = P_HEAD + 2
+I_ARM_V = P_HEAD + 3
+I_ARM_A = P_HEAD + 4
+I_DELAY = P_HEAD + 5
+I_BP = P_HEAD + 6
+I_SODO = P_HEAD + 7
+I_BARO = P_HEAD + 8
+# --- p: sensors ------------------------------------------------------------------------
+Q_G = P_HEAD + 9  # gyro noise [(rad/s)/sqrt(Hz)]
+Q_A = P_HEAD + 10  # accelerometer noise [(m/s^2)/sqrt(Hz)]
+Q_BG = P_HEAD + 11  # walk of the gyro bias [(rad/s)/sqrt(s)]
+Q_BA = P_HEAD + 12  # walk of the accelerometer bias [(m/s^2)/sqrt(s)]
+Q_MOUNT = P_HEAD + 13  # walk of the mount [rad/sqrt(s)]
+SD_BG = P_HEAD + 14  # prior sigmas
+SD_BA = P_HEAD + 15
+SD_SCALE_G = P_HEAD + 16
+SD_SCALE_A = P_HEAD + 17
+SD_MOUNT = P_HEAD + 18
+SD_ARM_V = P_HEAD + 19
+SD_ARM_A = P_HEAD + 20
+SD_DELAY = P_HEAD + 21
+ARM_V_0 = P_HEAD + 22  # prior of ARM_V [m]
+# --- p: fixes --------------------------------------------------------------------------
+TAU_BP = P_HEAD + 23  # time constant of the slow error [s]
+SHARE_BP = P_HEAD + 24  # slow error of position per receiver sigma
+WHITE_P = P_HEAD + 25  # fast error of position per receiver sigma, to begin with
+SCALE_V = P_HEAD + 26  # error of velocity per receiver sigma, to begin with
+LEARN = P_HEAD + 27  # per fix
+GATE = P_HEAD + 28  # of the normalised innovation squared
+RECOVER = P_HEAD + 29  # time after which a rejection is overruled [s]
+# --- p: vehicle and rest ---------------------------------------------------------------
+CAR = P_HEAD + 30  # 1 with the non-holonomic constraint
+SD_SIDE = P_HEAD + 31  # [m/s]
+SD_UP = P_HEAD + 32  # [m/s]
+SLIP = P_HEAD + 33  # side slip per lateral acceleration [s]
+T_CON = P_HEAD + 34  # [s]
+V_CON = P_HEAD + 35  # least speed of the constraint [m/s]
+SD_ROLL = P_HEAD + 36  # [rad]
+ZUPT = P_HEAD + 37  # 1 with standstill updates
+SD_REST_V = P_HEAD + 38  # [m/s]
+SD_REST_G = P_HEAD + 39  # [(rad/s) sqrt(s)]
+REST_G = P_HEAD + 40  # [rad/s]
+REST_A = P_HEAD + 41  # [m/s^2]
+REST_T = P_HEAD + 42  # [s]
+SD_SPEED = P_HEAD + 43  # of wheel speed [m/s]
+SD_BARO = P_HEAD + 44  # [m]
+SD_SODO = P_HEAD + 45
+# --- p: timing -------------------------------------------------------------------------
+TICK = P_HEAD + 46  # [s]
+REALIGN_GAP = P_HEAD + 47  # [s]
+SD_HEADING = P_HEAD + 48  # at which alignment ends [rad]
+P_SIZE = P_HEAD + 49
+
+# --- w: the last fix, for diagnostics -----------------------------------------------------------
+D_POS = W_HEAD  # innovation of position, NED [m]: 3
+D_VEL = W_HEAD + 3  # of velocity [m/s]: 3
+D_SPOS = W_HEAD + 6  # sigma of the former: 3
+D_SVEL = W_HEAD + 9  # of the latter: 3
+D_NPOS = W_HEAD + 12  # normalised innovation squared of position
+D_NVEL = W_HEAD + 13  # of velocity
+D_OPOS = W_HEAD + 14  # outcome of position, a code of kernels.status
+D_OVEL = W_HEAD + 15  # outcome of velocity
+N_DIAG = 16
+D_NEW = W_HEAD + 16  # 1 when the above are of this sample
+OUT_SIZE = 39  # a row of output: 36 cells of the head from STATUS on, then ARM_A
+OUT_HEAD = 36
+# --- w: scratch -------------------------------------------------------------------------------
+STRIDE = 40
+H = W_HEAD + 20  # measurement row
+PH = H + STRIDE  # P h
+DX = PH + STRIDE  # gathered correction
+GAIN = DX + STRIDE
+S3 = GAIN + STRIDE  # small matrices
+F = S3 + STRIDE  # Phi - I of the nine inertial rows, 9 x m
+G = F + 200  # (Phi - I) P, 9 rows; in the smoother F^T Lam, m x n
+RECORD = G + 24 * STRIDE  # 1 while the tape runs
+NEXT = RECORD + 1  # next free place on the tape
+MOVED = RECORD + 2  # correction since the last mark on the tape
+TAPE = MOVED + STRIDE  # the tape begins here; also the length of w without a tape
+
+# --- records of the tape: kind, payload, length of the whole ----------------------------------
+R_PREDICT = 1  # factor of BP, F
+R_SCALAR = 2  # variance, innovation, h, P h
+R_RESET = 3  # first index, number: states that were given a new prior
+R_START = 4  # navigation began
+R_MARK = 5  # sample, correction since the last mark, P

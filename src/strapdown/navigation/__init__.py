@@ -1,0 +1,6 @@
+"""Navigation: position, velocity and attitude from an IMU and what aids it."""
+
+from strapdown.navigation.loosely_coupled import LooselyCoupled
+from strapdown.navigation.tracker import NavigationTracker
+
+__all__ = ["LooselyCoupled", "NavigationTracker"]

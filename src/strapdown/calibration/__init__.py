@@ -33,7 +33,7 @@ from strapdown.calibration.multi_position import (
     distortion_matrix,
     gyro_from_rate_table,
 )
-from strapdown.calibration.poses import HAND_HELD, TURNTABLE, Poses, find_poses
+from strapdown.calibration.poses import Poses, find_poses, find_turntable_positions
 from strapdown.calibration.positions import (
     eighteen_position,
     eighteen_positions,
@@ -57,8 +57,6 @@ from strapdown.calibration.temperature import require_rest, slope_matters, tempe
 from strapdown.calibration.turn_on import TurnOnBias, turn_on_bias
 
 __all__ = [
-    "HAND_HELD",
-    "TURNTABLE",
     "Alignment",
     "Calibration",
     "CalibrationRecord",
@@ -82,6 +80,7 @@ __all__ = [
     "eighteen_positions",
     "ellipsoid",
     "find_poses",
+    "find_turntable_positions",
     "gyro_from_rate_table",
     "load",
     "merge_into",

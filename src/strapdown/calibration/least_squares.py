@@ -53,14 +53,12 @@ class Solution:
     def covariance(self, std: float | None = None) -> FloatArray:
         """Return the covariance of the unknowns.
 
-        With the standard deviation of one residual from the residuals themselves unless `std`
-        gives it. NaN where neither can: no degrees of freedom and no `std`.
+        The variance of one residual is the larger of what the residuals show and ``std**2``: few
+        degrees of freedom can by chance look better than the noise. NaN without either.
         """
-        if std is not None:
-            return self.cofactor * std**2
-        if self.dof == 0:
-            return np.full_like(self.cofactor, np.nan)
-        return np.asarray(self.cofactor * (self.residuals @ self.residuals) / self.dof)
+        shown = float(self.residuals @ self.residuals) / self.dof if self.dof else np.nan
+        stated = np.nan if std is None else std**2
+        return np.asarray(self.cofactor * np.fmax(shown, stated))
 
 
 def gauss_newton(

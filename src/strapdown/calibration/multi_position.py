@@ -88,8 +88,9 @@ def accelerometer_from_poses(
         Local gravity [m/s^2]. Its relative error goes into all scale factors; take it from
         `strapdown.earth.normal_gravity`.
     std : float, optional
-        Standard deviation of the mean of one axis in one pose [m/s^2]; default is from the
-        residuals, which needs more poses than unknowns.
+        Standard deviation of the mean of one axis in one pose [m/s^2], such as
+        ``poses.acc_std`` states. The sigmas come from it or from the residuals, whichever is
+        larger; without it there must be more poses than unknowns.
     variant : {"exact", "thesis"}
         See the module.
     tolerances : mapping of str to float, optional
@@ -143,8 +144,8 @@ def gyro_from_rate_table(
         that the table stands: such a row gives three equations, for the bias alone. The
         Earth's rate, 0.004 deg/s, is left out.
     std : float, optional
-        Standard deviation of the mean of one axis in one position [rad/s]; default is from
-        the residuals.
+        Standard deviation of the mean of one axis in one position [rad/s]. The sigmas come
+        from it or from the residuals, whichever is larger.
     variant : {"exact", "thesis"}
         See the module.
     tolerances : mapping of str to float, optional

@@ -15,13 +15,13 @@ from numpy.typing import ArrayLike
 
 from strapdown import motion
 from strapdown._checks import as_samples, as_times, positive, same_length
-from strapdown._types import FloatArray
+from strapdown._types import FloatArray, IntArray
 from strapdown.calibration.sphere import unit_vectors
 from strapdown.units import DEG, DPS
 
 HAND_HELD = motion.RestTest(max_gyr_std=10.0 * DPS, max_acc_std=1.0)
 TURNTABLE = motion.RestTest(max_rate=math.inf)
-_LOOSENESS = (1.0, 2.0, 4.0, 8.0)  # multiples of the test's factor that are tried
+_LOOSENESS = tuple(2.0**k for k in range(7))  # multiples of the test's factor that are tried
 _JOLT = 3.0  # longest interruption of one pose [s]
 _DISTINCT = 5.0 * DEG  # orientations closer than this count once
 
@@ -40,6 +40,8 @@ class Poses:
         Mean raw magnetic field [T], where the log has one; NaN without a sample in the pose.
     samples : ndarray, shape (n,)
         Samples in each mean.
+    acc_std, gyr_std : float
+        Standard deviation of a mean of one axis, typical of all poses, if the noise were white.
     """
 
     t_start: FloatArray
@@ -48,6 +50,8 @@ class Poses:
     gyr: FloatArray
     mag: FloatArray | None
     samples: FloatArray
+    acc_std: float
+    gyr_std: float
 
     def __len__(self) -> int:
         return len(self.t_start)
@@ -62,6 +66,7 @@ def find_poses(
     *,
     rest: motion.RestTest = HAND_HELD,
     wander: float = 2.0 * DEG,
+    loosest: float = math.inf,
 ) -> Poses:
     """Return the poses of a continuous log.
 
@@ -74,10 +79,11 @@ def find_poses(
     t_mag, mag : array_like, optional
         Time [s], shape (m,), and raw field [T], shape (m, 3).
     rest : RestTest
-        What counts as rest; `TURNTABLE` finds steady rotation too. Its factor is the
-        strictest one that is tried.
+        What counts as rest. Its factor is the strictest one that is tried.
     wander : float
         How far gravity may turn within a pose [rad].
+    loosest : float
+        How many times that factor may be exceeded, for tremor; 1 allows none.
 
     Returns
     -------
@@ -96,8 +102,10 @@ def find_poses(
     tried = [
         _pose_segments(t, gyr, acc, replace(rest, factor=k * rest.factor), wander)
         for k in _LOOSENESS
+        if k <= loosest
     ]
-    joined = max(tried, key=lambda poses: _distinct(acc, poses))  # the strictest of equals
+    # Most orientations; then the fewest interruptions; then the strictest.
+    joined = max(tried, key=lambda poses: (_distinct(acc, poses), -sum(map(len, poses))))
     rows = [np.concatenate([np.arange(s.start, s.stop) for s in pose]) for pose in joined]
     field = None
     if t_mag is not None and mag is not None:
@@ -111,7 +119,27 @@ def find_poses(
         gyr=_means(gyr, rows),
         mag=field,
         samples=np.array([float(len(r)) for r in rows]),
+        acc_std=_std_of_mean(acc, rows),
+        gyr_std=_std_of_mean(gyr, rows),
     )
+
+
+def find_turntable_positions(t: ArrayLike, gyr: ArrayLike, acc: ArrayLike) -> Poses:
+    """Return the stretches of steady rotation, or rest, on a table of vertical axis.
+
+    Parameters
+    ----------
+    t : array_like, shape (n,)
+        Time [s].
+    gyr, acc : array_like, shape (n, 3)
+        Raw samples [rad/s], [m/s^2].
+
+    Returns
+    -------
+    Poses
+        In order of time; both speeds in one position are two of them.
+    """
+    return find_poses(t, gyr, acc, rest=TURNTABLE, loosest=1.0)
 
 
 def _pose_segments(
@@ -133,8 +161,15 @@ def _distinct(acc: FloatArray, poses: list[list[motion.Segment]]) -> int:
     return len(kept)
 
 
-def _means(samples: FloatArray, rows: list[FloatArray]) -> FloatArray:
+def _means(samples: FloatArray, rows: list[IntArray]) -> FloatArray:
     return np.array([np.nanmean(samples[r], axis=0) for r in rows]).reshape(-1, 3)
+
+
+def _std_of_mean(samples: FloatArray, rows: list[IntArray]) -> float:
+    if not rows:
+        return math.nan
+    variances = [float(np.nanvar(samples[r], axis=0).mean()) / len(r) for r in rows]
+    return math.sqrt(float(np.mean(variances)))
 
 
 def _field_means(

@@ -107,7 +107,7 @@ def post(x: Vec, gyr: Vec, acc: Vec, mag: Vec) -> bool:
         x[MAG + 2] = mag[1]
         x[MAG + 3] = mag[2]
         return True
-    return mag.shape[0] == 0
+    return bool(mag.shape[0] == 0)
 
 
 @kernel

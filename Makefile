@@ -9,7 +9,7 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet install
 export STRAPDOWN_CACHE_DIR ?= $(CURDIR)/.numba_cache
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test check bench tables docs picture clean
+.PHONY: help demo test check bench tables pages docs picture clean
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "make %-8s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -33,8 +33,11 @@ bench: $(STAMPS)/bench  ## speed, side by side with vqf and imufusion
 	STRAPDOWN_SPEED_TABLE=docs/tables/speed.md $(BIN)/python -m pytest benchmarks -q \
 	  --benchmark-disable-gc --benchmark-columns=median,iqr,rounds
 
-tables: $(STAMPS)/core  ## accuracy on the real recordings, for the docs
-	$(BIN)/python docs/tables/make_broad.py
+tables: $(STAMPS)/core  ## the tables of the docs, from the real recordings
+	for script in docs/tables/make_*.py; do $(BIN)/python $$script || exit 1; done
+
+pages: $(STAMPS)/core  ## the output that README and quickstart show
+	$(BIN)/python docs/renew_pages.py
 	$(BIN)/python docs/tables/make_report.py
 
 docs: $(STAMPS)/docs  ## the documentation, warnings are errors

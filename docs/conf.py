@@ -15,9 +15,11 @@ extensions = [
     "sphinx.ext.mathjax",
     "sphinx.ext.viewcode",
 ]
-exclude_patterns = ["_build", "tables"]
+exclude_patterns = ["_build", "tables"]  # tables are included by pages
 myst_enable_extensions = ["colon_fence", "deflist", "dollarmath"]
 myst_heading_anchors = 3
+
+suppress_warnings = ["ref.citation"]  # a source may be listed without being cited
 
 autosummary_generate = True
 autodoc_typehints = "none"  # the docstrings say shapes and units, which types cannot

@@ -57,8 +57,9 @@ class Panel:
 
 def main() -> None:
     """Run the demo, draw it."""
-    rec = sd.simulation.demo_recording()
-    sol = sd.attitude.Mekf().run(rec)
+    rec = sd.simulation.demo.recording()
+    best = sd.estimators.preferred(rec)
+    sol = sd.estimators.create(best, declination=sd.attitude.declination(rec)).run(rec)
     errors = sd.evaluation.attitude_errors(sol, rec.reference)
     shown = slice(None, None, 12)
 
@@ -71,7 +72,7 @@ def main() -> None:
             attitude.line(sol.t[part][shown], angle[part][shown], color, 'stroke-width="1.6"')
         attitude.label(row, name, color)
 
-    below = Panel(TOP + height + GAP, height, (-4.0, 4.0), "error about north and down [deg]")
+    below = Panel(TOP + height + GAP, height, (-3.0, 3.0), "error about north and down [deg]")
     for row, (name, error, sigma, color) in enumerate(
         (
             ("north", errors.tilt_n[:, 0], errors.std_n[:, 0], COLORS["pitch"]),

@@ -38,7 +38,7 @@ def main() -> None:
     if not logs:
         sys.exit(f"needs the trials of BROAD in {TRIALS}")
     flts = {"madgwick, beta 0.12": sd.estimators.create("madgwick", beta=0.12)}
-    flts |= {name: sd.estimators.create(name) for name in sd.estimators.names("attitude")}
+    flts |= {e.name: e.cls() for e in sd.estimators.entries() if e.gives == "attitude"}
     rows: dict[str, list[np.ndarray]] = {}
     for log in logs:
         rec, trial = sd.read(log), log.name[:2]

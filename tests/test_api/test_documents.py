@@ -77,11 +77,18 @@ def test_code_on_the_page_prints_what_the_page_shows(page, tmp_path):
 @pytest.mark.parametrize("page", PAGES, ids=lambda path: path.name)
 def test_commands_on_the_page_print_what_the_page_shows(page, tmp_path):
     """In ``console`` blocks, the lines after ``$ strapdown ...`` are what it prints."""
+    folder, shared = tmp_path / "project", ROOT.parent / "shared"
+    folder.mkdir()
+    (tmp_path / "shared").symlink_to(shared)
+    compared = 0
     for kind, body in blocks(page):
         if kind != "console":
             continue
         for part in re.split(r"^\$ ", body, flags=re.MULTILINE)[1:]:
             line, _, output = part.partition("\n")
             words = shlex.split(line, comments=True)
-            if words[0] == "strapdown" and output.strip() and "../shared" not in line:
-                assert shown(run(["-m", *words], tmp_path)) == shown(output)
+            if not output.strip() or ("../shared" in line and not shared.is_dir()):
+                continue
+            assert shown(run(["-m", *words], folder)) == shown(output)
+            compared += 1
+    assert compared

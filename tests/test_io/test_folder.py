@@ -76,6 +76,21 @@ def test_the_times_of_several_files_keep_one_origin(tmp_path: Path) -> None:
     np.testing.assert_allclose(rec.mag.mag[0], [0, 0, 48e-6], rtol=1e-15)  # as that app writes
 
 
+def test_an_autopilots_folder_shares_its_microseconds(tmp_path: Path) -> None:
+    t = 5e6 + 4000 * np.arange(100)
+    one = np.ones(100)
+    imu = np.column_stack((t, 0.1 * one, 0.2 * one, 0.3 * one, 0 * one, 0 * one, -G * one))
+    names = [f"gyro_rad[{k}]" for k in range(3)] + [f"accelerometer_m_s2[{k}]" for k in range(3)]
+    save(tmp_path / "log_sensor_combined_0.csv", ",".join(["timestamp", *names]), imu)
+    air = np.column_stack((t[::5], 400 + one[::5], 95000 + one[::5]))
+    head = "timestamp,baro_alt_meter,baro_pressure_pa"
+    save(tmp_path / "log_vehicle_air_data_0.csv", head, air)
+    rec = sd.read(tmp_path)
+    np.testing.assert_allclose(rec.imu.t[[0, -1]], [5.0, 5.396])
+    np.testing.assert_allclose(rec.baro.t, rec.imu.t[::5])
+    assert rec.baro.pressure[0] == 95001.0
+
+
 def test_two_recordings_in_a_folder_are_refused(tmp_path: Path) -> None:
     head = "t_s,gx_rad_s,gy_rad_s,gz_rad_s,ax_m_s2,ay_m_s2,az_m_s2"
     for name in ("monday.csv", "tuesday.csv"):

@@ -64,6 +64,8 @@ NAMES = [
     ("Pressure (hPa)", "pressure", "hpa"),
     ("temp_degc", "temp", "degc"),
     ("gyro_temp", "temp", None),
+    ("baro_temp_degc", "temp", "degc"),
+    ("locationLatitude(WGS84)", "lat", None),
     ("wheel_speed_kmh", "speed", "kmh"),
     ("encoder_deg", "angle", "deg"),
     ("qw", "q_w", None),

@@ -79,7 +79,7 @@ _FUSED: Final = re.compile(
 _NOISE: Final = frozenset(
     _split(
         "raw cal calibrated uncal uncalibrated filtered value values data txt val v sensor imu"
-        " n/a field the of axis total body b rs msg fast"
+        " n/a field the of axis total body b rs msg fast wgs84 n a.u. au"
     )
 )
 
@@ -235,9 +235,9 @@ def _scalar(words: list[str]) -> tuple[str, list[str]] | None:
     if known & {"bias", "std", "sigma", "var", "variance", "accuracy", "error", "offset"}:
         return None
     for role, spellings in (
+        ("temp", {"temp", "temperature", "thermometer"}),  # of the barometer, too
         ("pressure", {"pressure", "press", "baro", "barometer"}),
         ("airspeed", {"airspeed", "tas", "ias", "eas"}),
-        ("temp", {"temp", "temperature", "thermometer"}),
         ("angle", {"encoder"}),
     ):
         hit = known & spellings

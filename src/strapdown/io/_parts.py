@@ -100,17 +100,17 @@ def _parts_of(
         missing = missing_parts(group, list(groups[group]))
         if not missing:
             continue
-        height = missing == ["height"] or missing == ["ref_height"]
+        fault = group in ("gyr", "acc", "mag")
         findings.append(
             Finding(
                 kind="columns",
                 what=f"{group} needs {', '.join(NEEDED[group])}, "
                 f"found only {', '.join(repr(c.name) for c in groups[group].values())}"
-                + (": fixes without height are left out" if height else ""),
-                fault=not height,
+                + ("" if fault else ": left out"),
+                fault=fault,
                 file=table.file,
                 stream=group,
-                hint=None if height else "name the others with --columns (columns={...})",
+                hint="name the others with --columns (columns={...})" if fault else None,
             )
         )
         del groups[group]

@@ -88,7 +88,20 @@ def load(path: Path, options: Options) -> RawLog:
         elif options.everything:
             tables.append(table)
     raw.tables = choose(tables, path, raw.findings)
+    _share_time_units(raw.tables, raw.findings)
     return raw
+
+
+def _share_time_units(tables: Sequence[Table], findings: list[Finding]) -> None:
+    """Give times without a unit that of another file's times of the same name."""
+    times = [column for table in tables if (column := table.by_role("t")) is not None]
+    known = {column.name: column.unit for column in times if column.unit is not None}
+    for table in tables:
+        column = table.by_role("t")
+        if column is not None and column.unit is None and column.name in known:
+            column.unit = known[column.name]
+            what = f"{column.name!r} is read in {column.unit.symbol} as in the other files"
+            findings.append(Finding(kind="unit", what=what, file=table.file))
 
 
 def load_files(

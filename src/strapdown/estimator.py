@@ -5,6 +5,7 @@ compiled kernel makes ``run``, ``advance``, ``step`` and the ``tracker``, so all
 the last bit.
 """
 
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields
 from importlib import import_module
@@ -28,7 +29,6 @@ _NO_TIMES: FloatArray = np.empty(0)
 _NO_ROWS: FloatArray = np.empty((0, 3))
 _NO_EVENTS: FloatArray = np.empty((0, 3))
 _NO_DIAGNOSTICS: FloatArray = np.empty((0, _m.W_HEAD))
-_FLOAT = np.dtype(np.float64)
 
 # Where the arrays of a solution stand in the memory.
 CELLS: Mapping[str, int] = {
@@ -101,14 +101,9 @@ class Tracker:
 
     def __init__(self, estimator: "Estimator", state: State | None = None) -> None:
         state = estimator._own(estimator.init() if state is None else state)
-        self._name = state.name
-        self._p, self._w = estimator._params(), np.zeros(estimator._kernel().W_SIZE)
-        self._x, self._P = state.x.copy(), state.P.copy()
-        self._t = state.t if state.t == state.t else -np.inf
-        self._update = estimator._kernel().update
-        # Compile for exactly these types now; any other is then converted, never compiled for.
-        zero = np.zeros(3)
-        self._update(self._x.copy(), self._P.copy(), self._p, self._w, 0.0, zero, zero, zero)
+        self._update, self._p, self._w = estimator._ready()
+        self._name, self._x, self._P = state.name, state.x.copy(), state.P.copy()
+        self._t = -math.inf if math.isnan(state.t) else state.t
 
     def update(
         self, t: float, gyr: ArrayLike, acc: ArrayLike, mag: ArrayLike | None = None
@@ -131,19 +126,17 @@ class Tracker:
         ValueError
             If time does not increase or a vector has not three components.
         """
-        if not t > self._t:
+        if not self._t < t < math.inf:
             raise ValueError(f"`t` must increase, got {t} after {self._t}.")
-        if type(gyr) is not np.ndarray or gyr.dtype is not _FLOAT or not gyr.flags.carray:
-            gyr = _checks.as_vector("gyr", gyr, allow_nan=True).copy()
-        if type(acc) is not np.ndarray or acc.dtype is not _FLOAT or not acc.flags.carray:
-            acc = _checks.as_vector("acc", acc, allow_nan=True).copy()
         if mag is None:
             mag = _NO_VECTOR
-        elif type(mag) is not np.ndarray or mag.dtype is not _FLOAT or not mag.flags.carray:
-            mag = _checks.as_vector("mag", mag, allow_nan=True).copy()
-        if not self._update(self._x, self._P, self._p, self._w, t, gyr, acc, mag):
-            shapes = ", ".join(str(np.shape(v)) for v in (gyr, acc, mag))
-            raise ValueError(f"`gyr`, `acc` and `mag` must have shape (3,), got {shapes}.")
+        try:
+            ok = self._update(self._x, self._P, self._p, self._w, t, gyr, acc, mag)
+        except TypeError:  # not float64 vectors
+            t, gyr, acc, mag = _as_kernel_input(t, gyr, acc, mag)
+            ok = self._update(self._x, self._P, self._p, self._w, t, gyr, acc, mag)
+        if not ok:
+            raise _wrong_lengths(gyr, acc, mag)
         self._t = t
 
     @property
@@ -183,7 +176,8 @@ class Estimator:
     pieces, single samples and the tracker follow from them.
     """
 
-    __slots__ = ()
+    __slots__ = ("_kept",)
+    _kept: tuple[Any, FloatArray, FloatArray]  # what `_ready` makes; not a parameter
     NAME: ClassVar[str]
     OUTPUTS: ClassVar[tuple[str, ...]] = ("q_nb", "gyr_bias")
 
@@ -322,25 +316,25 @@ class Estimator:
         State
         """
         state = self._own(state)
-        if not t > state.t and state.t == state.t:
-            raise ValueError(f"`t` must increase, got {t} after {state.t}.")
         x, P = state.x.copy(), state.P.copy()
-        if mag is not None:
-            x[_m.MAG] = 1.0
-            x[_m.MAG + 1 : _m.MAG + 4] = _checks.as_vector("mag", mag, allow_nan=True)
+        if t <= x[_m.T] or not math.isfinite(t):
+            raise ValueError(f"`t` must increase, got {t} after {state.t}.")
         for name, value in aiding.items():
             cell, count = _INBOX[_checks.one_of("aiding", name, _INBOX)]
             x[cell] = 1.0
             x[cell + 1 : cell + 1 + count] = _checks.as_vector(
                 name, np.atleast_1d(np.asarray(value, dtype=np.float64)), count, allow_nan=True
             )
-        kernel = self._kernel()
-        gx, gy, gz = _checks.as_vector("gyr", gyr, allow_nan=True).tolist()
-        ax, ay, az = _checks.as_vector("acc", acc, allow_nan=True).tolist()
-        kernel.step(
-            x, P, self._params(), np.zeros(kernel.W_SIZE),
-            _checks.finite("t", t), gx, gy, gz, ax, ay, az,
-        )  # fmt: skip
+        update, p, w = self._ready()
+        if mag is None:
+            mag = _NO_VECTOR
+        try:
+            ok = update(x, P, p, w, t, gyr, acc, mag)
+        except TypeError:  # not float64 vectors
+            t, gyr, acc, mag = _as_kernel_input(t, gyr, acc, mag)
+            ok = update(x, P, p, w, t, gyr, acc, mag)
+        if not ok:
+            raise _wrong_lengths(gyr, acc, mag)
         return State(state.name, x, P)
 
     def tracker(self, state: State | None = None) -> Tracker:
@@ -361,11 +355,26 @@ class Estimator:
         """Return the parameters by name."""
         return {f.name: getattr(self, f.name) for f in fields(self)}  # type: ignore[arg-type]
 
+    def _ready(self) -> tuple[Any, FloatArray, FloatArray]:
+        """Return the kernel of a single sample, its parameters and its scratch, made once."""
+        try:
+            return self._kept
+        except AttributeError:
+            kernel = self._kernel()
+            x, P = self._memory()
+            p, w, zero = self._params(), np.zeros(kernel.W_SIZE), np.zeros(3)
+            kernel.update(x, P, p, w, 0.0, zero, zero, zero)
+            # From now on other types are refused, not compiled for: they are converted then.
+            if hasattr(kernel.update, "disable_compile"):
+                kernel.update.disable_compile()
+            object.__setattr__(self, "_kept", (kernel.update, p, w))
+            return kernel.update, p, w
+
     def _own(self, state: State) -> State:
         """Return the state if it is this estimator's; a restored name may be an array."""
-        if str(state.name) != self.NAME:
+        if state.name != self.NAME:
             raise ValueError(f"`state` must belong to {self.NAME}, got one of {state.name}.")
-        return State(self.NAME, state.x, state.P)
+        return state
 
     def _events(self, rec: Recording) -> FloatArray:
         """Return the rare aiding that the estimator uses, as rows for `load_events`."""
@@ -393,6 +402,28 @@ class Estimator:
             meta={"parameters": self.parameters()},
             **arrays,
         )
+
+
+def _as_kernel_input(
+    t: float, gyr: ArrayLike, acc: ArrayLike, mag: ArrayLike
+) -> tuple[float, FloatArray, FloatArray, FloatArray]:
+    """Return a sample in the types that kernels are compiled for."""
+    if np.shape(mag) == (0,):
+        mag = _NO_VECTOR
+    else:
+        mag = np.array(_checks.as_vector("mag", mag, allow_nan=True))
+    return (
+        _checks.finite("t", t),
+        np.array(_checks.as_vector("gyr", gyr, allow_nan=True)),
+        np.array(_checks.as_vector("acc", acc, allow_nan=True)),
+        mag,
+    )
+
+
+def _wrong_lengths(*vectors: Any) -> ValueError:
+    """Return the error for vectors that have not three components."""
+    shapes = ", ".join(str(np.shape(v)) for v in vectors)
+    return ValueError(f"`gyr`, `acc` and `mag` must have shape (3,), got {shapes}.")
 
 
 _INBOX: Mapping[str, tuple[int, int]] = {

@@ -186,6 +186,7 @@ def test_dates_are_read(write_text: Write, form: str) -> None:
     rec = sd.read(write_text("DateTime,gx,gy,gz,ax,ay,az", *text))
     np.testing.assert_allclose(rec.imu.t, np.arange(30) * 0.01, atol=1e-12)
     assert rec.meta["epoch_utc"] == "2024-05-31T23:59:59.6Z"
+    assert ("without a time zone" in " ".join(rec.meta["notes"])) == (form == "{} {}")
 
 
 def test_times_of_day_go_on_after_midnight(write_text: Write) -> None:

@@ -99,7 +99,9 @@ def load_table(path: Path, options: Options, findings: list[Finding]) -> Table:
         values = numbers.values[j]
         if kind == "clock":
             values = _past_midnight(values)
-        if kind == "date" and not layout.sample[0][wanted[j][0]].endswith("Z"):
+        if kind == "date" and not re.search(
+            r"(Z|[+-]\d\d:?(\d\d)?)$", layout.sample[0][wanted[j][0]][10:]
+        ):
             findings.append(
                 Finding(
                     kind="clock",

@@ -295,6 +295,13 @@ def test_field_at_the_poles_is_finite_and_unique(lat_deg):
     assert_close(fields, np.broadcast_to(fields[0], (3, 3)), atol=1e-6 * 60e-6)
 
 
+def test_field_below_sea_level_is_a_little_stronger():
+    deep, high = (earth.magnetic_field((0.9, 0.2, h), 2026.0).field_n for h in (-999.0, 0.0))
+    # a dipole falls with the cube of the distance: 3 km / 6371 km
+    ratio = np.linalg.norm(deep) / np.linalg.norm(high)
+    assert ratio == pytest.approx(1.0 + 3.0 / 6371.0, abs=1e-4)
+
+
 def test_field_has_no_seam_at_the_antimeridian():
     a = earth.magnetic_field((-16.5 * DEG, 180 * DEG, 0.0), 2026.0)
     b = earth.magnetic_field((-16.5 * DEG, -180 * DEG, 0.0), 2026.0)
@@ -386,6 +393,7 @@ def test_any_leading_shape_and_nan_in_its_own_row(function, item):
         (lambda: earth.ned_from_ecef([6.4e6, 0, 0], [NAN, 0.2, 0.3]), r"`lla_ref` must be finite"),
         (lambda: earth.ned_from_ecef([6.4e6, 0, 0], [45.0, 0.2, 0.3]), r"latitude in `lla_ref` must lie"),
         (lambda: earth.magnetic_field([0.1, 0.2, 900e3], 2026.0), r"height of `lla` must lie in \[-1000, 850000\] m, got 900000\.$"),
+        (lambda: earth.magnetic_field([0.1, 0.2, -1001.0], 2026.0), r"height of `lla` must lie in .*, got -1001\.$"),
         (lambda: earth.magnetic_field([60.1, 0.2, 0.0], 2026.0), r"latitude in `lla` must lie"),
         (lambda: earth.magnetic_field([[0.1, 0.2, 0.0]], 2026.0), r"`lla` must have shape \(3,\), got \(1, 3\)"),
         (lambda: earth.magnetic_field([NAN, 0.2, 0.0], 2026.0), r"`lla` must be finite"),

@@ -134,11 +134,10 @@ def print_table(
     numbers = set(right)
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False, show_header=any(header))
     for column, name in enumerate(header):
-        last = column == len(header) - 1
         table.add_column(
             name,
             justify="right" if column in numbers else "left",
-            no_wrap=not last,
+            no_wrap=column == 0 or column in numbers,
             overflow="fold",
         )
     for row in rows:

@@ -131,8 +131,8 @@ REST_RATE = 3.5e-4  # mean rate at rest, bias apart [rad/s]
 TILT_STD = 0.1  # of an attitude levelled from one sample [rad]
 HEADING_STD = 0.3  # of a heading from one sample of the field [rad]
 LOST = 10.0  # deviations of the mean velocity that no motion explains
-LOST_HEADING = 0.5  # mean heading innovation that no room explains [rad]
-LOST_TIME = 5.0  # over which it is the mean [s]
+LOST_HEADING = 15.0  # deviations of the field to the side, alone, that no disturbance explains
+LOST_TIME = 5.0  # on the mean of so long [s]
 CLIPPED_RATE = 0.5  # the largest rate so far, if above this [rad/s] and ...
 CLIPPED_COUNT = 3.0  # ... repeated so often to the last bit, is the end of the range
 CLIPPED_TIME = 0.25  # how long an unseen rate lasts [s]
@@ -278,7 +278,7 @@ def _heading(x: Vec, P: Mat, p: Vec, w: Vec) -> int:
     w[D_MAG + 6] = s.ACCEPTED
     if off2 < DISTURBED * DISTURBED * usual:
         x[ASTRAY] += min(1.0, x[SINCE_MAG] / LOST_TIME) * (z - x[ASTRAY])
-    if abs(x[ASTRAY]) > LOST_HEADING:  # the gyro has missed a turn
+    if abs(x[ASTRAY]) * x[USUAL] > LOST_HEADING * p[P_MAG_STD]:  # the gyro has missed a turn
         P[PHI + 2, PHI + 2] += x[ASTRAY] * x[ASTRAY]
         x[ASTRAY] = 0.0
     # with more delay than assumed the field stood back by its turning
@@ -430,8 +430,8 @@ def _is_clipped(x: Vec, p: Vec, gx: float, gy: float, gz: float) -> bool:
     else:
         x[REPEATED] = 0.0
     x[LAST_GYR], x[LAST_GYR + 1], x[LAST_GYR + 2] = gx, gy, gz
-    clipped = top >= p[P_GYR_RANGE]
-    if top > CLIPPED_RATE and x[REPEATED] >= CLIPPED_COUNT:
+    clipped = False
+    if top >= p[P_GYR_RANGE] or (top > CLIPPED_RATE and x[REPEATED] >= CLIPPED_COUNT):
         clipped = True
     return clipped
 

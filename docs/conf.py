@@ -1,5 +1,8 @@
 """Sphinx settings; `make docs` builds, and every warning is an error."""
 
+import re
+from typing import Any
+
 import strapdown
 
 project = "strapdown"
@@ -34,3 +37,26 @@ html_show_sourcelink = False
 html_theme_options = {"navigation_with_keys": False, "show_toc_level": 2}
 templates_path = ["_templates"]
 html_static_path: list[str] = []
+
+
+def setup(app: Any) -> None:
+    """Let functions cite the sources that their module lists; leave libraries' classes out."""
+    app.connect("autodoc-process-docstring", _cite_module, priority=400)  # before numpydoc
+    app.connect("autodoc-skip-member", _skip_imported)
+
+
+def _cite_module(app: Any, what: str, name: str, obj: Any, options: Any, lines: list[str]) -> None:
+    """Make ``[1]_`` plain text where the docstring itself has no such source."""
+    own = set(re.findall(r"^\s*\.\. \[(\w+)\]", "\n".join(lines), re.MULTILINE))
+    for row, line in enumerate(lines):
+        lines[row] = re.sub(
+            r"\[(\w+)\]_", lambda cited: cited[0] if cited[1] in own else cited[0][:-1], line
+        )
+
+
+def _skip_imported(
+    app: Any, what: str, name: str, obj: Any, skip: bool, options: Any
+) -> bool | None:
+    """Skip what a module imported from a library."""
+    home = str(getattr(obj, "__module__", None) or "strapdown")
+    return None if home.startswith(("strapdown", "builtins")) else True

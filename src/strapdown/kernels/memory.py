@@ -246,12 +246,11 @@ def begin(
         if dt > p[P_MAX_GAP]:
             bits |= s.GAP
             todo = WIDEN
-        elif not 0.5 * usual < dt < 1.5 * usual:
-            if usual == 0.0 or dt < usual:
-                x[DT] = dt
-        else:
-            x[DT] = usual + 0.02 * (dt - usual)
-        if 0.0 < 1.01 * usual < dt:  # samples are missing: their rate is the mean of the two
+        elif usual == 0.0:
+            x[DT] = dt
+        else:  # a mean, so that jitter does not pass for samples that are missing
+            x[DT] = usual + 0.02 * (min(dt, 2.0 * usual) - usual)
+        if 0.0 < 1.5 * usual < dt:  # samples are missing: their rate is the mean of the two
             missed = 0.5 * (dt - usual) / dt
             wx += missed * (x[OMEGA] - gx)
             wy += missed * (x[OMEGA + 1] - gy)

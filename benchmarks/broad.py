@@ -1,14 +1,17 @@
 """Errors on BROAD beside those of `vqf`, trial by trial, as a Markdown table.
 
-    python benchmarks/broad.py [FOLDER] [--latency S] [--filter NAME]
+    python benchmarks/broad.py [FOLDER] [--latency S] [--filter NAME] [--sensitivity]
 
 Both sides see the same samples, and the declared latency is on in both or off in both. The
-metric is that of BROAD: the root mean square over the samples with movement.
+metric is that of BROAD: the root mean square over the samples with movement. With
+``--sensitivity`` each noise parameter is halved and doubled instead, and the change that would
+be best on all trials but one is tried on that one: how much is there to gain by fitting?
 """
 
 import argparse
 import os
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -24,6 +27,11 @@ from strapdown.units import DEG  # noqa: E402
 
 FOLDER = ROOT.parent / "shared/data/broad"
 ENU_TO_NED = np.array([0.0, 0.5**0.5, 0.5**0.5, 0.0])
+VARIED = (
+    "gyr_noise", "gyr_rate_noise", "gyr_bias_walk", "gyr_bias_std", "gyr_scale_std", "acc_noise",
+    "acc_bias_std", "velocity_std", "velocity_time", "mag_std", "mag_time", "mag_walk",
+    "mag_delay_std", "tails", "rest_gyr", "rest_acc", "interval",
+)  # fmt: skip
 OUTLIER = "27"  # a phone lies on the box: its field stays, and weighs a third of the mean
 
 
@@ -65,9 +73,13 @@ def main():
     parser.add_argument("--latency", type=float, default=0.0, help="declared latency [s]")
     parser.add_argument("--filter", default="robust-eskf")
     parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE")
+    parser.add_argument("--sensitivity", action="store_true")
     args = parser.parse_args()
     changed = {k: float(v) for k, v in (item.split("=") for item in args.set)}
     flt = sd.estimators.create(args.filter, latency=args.latency, **changed)
+    if args.sensitivity:
+        sensitivity([sd.read(path) for path in sorted(args.folder.glob("*.mat"))], flt)
+        return
     names, errors, honesty, cost = [], [], [], []
     for path in sorted(args.folder.glob("*.mat")):
         rec = sd.read(path)
@@ -85,6 +97,32 @@ def main():
         errors.append(rows)
         honesty.append(held)
     report(names, np.array(errors), np.array(honesty), cost)
+
+
+def sensitivity(recordings, flt):
+    """Print what halving and doubling each parameter does, and what choosing by it would gain."""
+    changes = [(None, 1.0)] + [(name, factor) for name in VARIED for factor in (0.5, 2.0)]
+    table = np.empty((len(changes), len(recordings), 2, 2))  # change, trial, causal or not, part
+    for row, (name, factor) in zip(table, changes, strict=True):
+        changed = replace(flt, **{name: factor * getattr(flt, name)}) if name else flt
+        for cell, rec in zip(row, recordings, strict=True):
+            for i, sol in enumerate((changed.run(rec, diagnostics=False), changed.smooth(rec))):
+                e = attitude_errors(sol, rec.reference)
+                cell[i] = [np.sqrt(np.mean(x**2)) / DEG for x in (e.total, e.inclination)]
+    print("Mean RMSE, total / inclination [deg]\n\n| Change | causal | smoothed |\n|---|---|---|")
+    for (name, factor), row in zip(changes, table.mean(axis=1), strict=True):
+        what = f"{name} x {factor:g}" if name else "none"
+        print(f"| {what} | " + " | ".join(f"{a:.2f} / {b:.2f}" for a, b in row) + " |")
+    print("\n| Chosen on the other trials | causal | smoothed |\n|---|---|---|")
+    held = []
+    for trial in range(len(recordings)):
+        others = np.delete(table[..., 0], trial, axis=1).mean(axis=1)
+        held.append([table[others[:, i].argmin(), trial, i, 0] for i in range(2)])
+    for what, row in (
+        ("none changed", table[0, :, :, 0].mean(axis=0)),
+        ("one", np.mean(held, axis=0)),
+    ):
+        print(f"| {what} | {row[0]:.2f} | {row[1]:.2f} |")
 
 
 def report(names, errors, honesty, cost):

@@ -81,7 +81,8 @@ def test_tracker_from_python(name, recording, take_turns, table):
     table(
         f"{name} `tracker.update` from Python",
         us(times["here"], PER_CALL),
-        f"imufusion `update`, `get_quaternion` {us(times['imufusion'], PER_CALL)}: {ratio:.2f} times",
+        f"imufusion `update`, `get_quaternion` {us(times['imufusion'], PER_CALL)}: "
+        f"{ratio:.2f} times",
         goal,
     )
     if goal:

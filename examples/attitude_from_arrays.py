@@ -5,7 +5,7 @@ From three arrays to an attitude
 A recording is what sensors said, an estimator is its parameters, a solution is what it
 believes. Here the arrays come from a simulated box in a moving hand, so the truth is known.
 
-The multiplicative Kalman filter finds the gyro bias, and its inclination stays below half a
+The multiplicative Kalman filter finds the gyro bias, and its inclination stays below one
 degree; integrating the gyro alone drifts: a bias of 0.4 deg/s makes tens of degrees in a minute.
 """
 

@@ -51,7 +51,9 @@ def names_of(value) -> list[str]:
 @pytest.mark.parametrize("value", CASES)
 def test_documented_parameters_are_those_of_the_signature(value):
     doc = NumpyDocString(inspect.cleandoc(value.__doc__))
-    assert names_in(doc) == names_of(value)
+    own = [n for n in names_of(value) if n in getattr(value, "__annotations__", {})]
+    # a subclass may leave the parameters of its base to the base's docstring
+    assert names_in(doc) in (names_of(value), own)
 
 
 @pytest.mark.parametrize("value", CASES)

@@ -5,7 +5,6 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from strapdown.constants import OMEGA_IE
-
 from strapdown.simulation import demo
 from strapdown.simulation.demo import SensorErrors
 from strapdown.units import DEG

@@ -15,11 +15,12 @@ from strapdown.kernels.memory import (
     BG,
     D_ACC,
     D_MAG,
-    GO,
     MAG,
     P_COS_D,
     P_HEAD,
     P_SIN_D,
+    SKIP,
+    START,
     W_HEAD,
     Q,
     advance_attitude,
@@ -48,10 +49,13 @@ def step(
     """Advance `x` by one sample, in the order of spec B 2.9.5."""
     # fmt: on
     todo, dt, wx, wy, wz, has_acc, has_mag = begin(x, p, w, t, gx, gy, gz, ax, ay, az)
-    if todo < GO:
+    if todo == SKIP:
+        return
+    if todo == START:
+        advance_attitude(x, (wx - x[BG]) * dt, (wy - x[BG + 1]) * dt, (wz - x[BG + 2]) * dt)
         return
     qw, qx, qy, qz = x[Q], x[Q + 1], x[Q + 2], x[Q + 3]
-    ex = ey = ez = 0.0
+    ex, ey, ez = 0.0, 0.0, 0.0
     if has_acc:
         k = -1.0 / sqrt(ax * ax + ay * ay + az * az)  # at rest f_b points up
         mx, my, mz = k * ax, k * ay, k * az
@@ -71,6 +75,8 @@ def step(
         if norm2 > 0.0:  # (48): twice the unit vector is the rate of a unit quaternion rate
             k = 2.0 / sqrt(norm2)
             ex, ey, ez = k * ex, k * ey, k * ez
+    elif has_mag:
+        x[MAG] = 1.0  # waits for the accelerometer
     zeta_dt = p[P_ZETA] * dt
     x[BG] -= zeta_dt * ex  # (50), (51)
     x[BG + 1] -= zeta_dt * ey

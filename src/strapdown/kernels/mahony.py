@@ -14,11 +14,12 @@ from strapdown.kernels.memory import (
     BG,
     D_ACC,
     D_MAG,
-    GO,
     MAG,
     P_COS_D,
     P_HEAD,
     P_SIN_D,
+    SKIP,
+    START,
     W_HEAD,
     Q,
     advance_attitude,
@@ -47,10 +48,13 @@ def step(
     """Advance `x` by one sample: the explicit filter of [1]_ with bias."""
     # fmt: on
     todo, dt, wx, wy, wz, has_acc, has_mag = begin(x, p, w, t, gx, gy, gz, ax, ay, az)
-    if todo < GO:
+    if todo == SKIP:
+        return
+    if todo == START:
+        advance_attitude(x, (wx - x[BG]) * dt, (wy - x[BG + 1]) * dt, (wz - x[BG + 2]) * dt)
         return
     qw, qx, qy, qz = x[Q], x[Q + 1], x[Q + 2], x[Q + 3]
-    ex = ey = ez = 0.0
+    ex, ey, ez = 0.0, 0.0, 0.0
     if has_acc:
         k = -1.0 / sqrt(ax * ax + ay * ay + az * az)  # at rest f_b points up
         mx, my, mz = k * ax, k * ay, k * az

@@ -32,19 +32,19 @@ FIX_SD = HEAD + 39  # position sigma of the last fix, NED [m]: 3
 # --- x: slow quantities ----------------------------------------------------------------
 ACC_N = HEAD + 42  # smoothed acceleration over ground, NED [m/s^2]: 3
 RATE = HEAD + 45  # smoothed angular rate less bias, b [rad/s]: 3
-# --- x: sums since the last covariance step, DT first ----------------------------------
-DT = HEAD + 48  # time [s]
-S_C = HEAD + 49  # sum of C_nb dt: 9
-S_CW = HEAD + 58  # sum of C_nb diag(omega) dt: 9
-S_F = HEAD + 67  # sum of f_n dt: 3
-S_CF = HEAD + 70  # sum of C_nb diag(f) dt: 9
-N_SUMS = 31
 # --- x: the Earth here -----------------------------------------------------------------
-GRAVITY = HEAD + 79  # [m/s^2]
-W_IN = HEAD + 80  # omega_in_n [rad/s]: 3
-W_COR = HEAD + 83  # 2 omega_ie_n + omega_en_n [rad/s]: 3
-R_N = HEAD + 86  # metres per radian of latitude
-R_E = HEAD + 87  # metres per radian of longitude
+GRAVITY = HEAD + 48  # [m/s^2]
+W_IN = HEAD + 49  # omega_in_n [rad/s]: 3
+W_COR = HEAD + 52  # 2 omega_ie_n + omega_en_n [rad/s]: 3
+R_N = HEAD + 55  # metres per radian of latitude
+R_E = HEAD + 56  # metres per radian of longitude
+# --- x: sums since the last covariance step, DT first ----------------------------------
+DT = HEAD + 57  # time [s]
+S_C = HEAD + 58  # sum of C_nb dt: 9
+S_CW = HEAD + 67  # sum of C_nb diag(omega) dt: 9
+S_F = HEAD + 76  # sum of f_n dt: 3
+S_CF = HEAD + 79  # sum of C_nb diag(f) dt: 9
+N_SUMS = 31
 # --- x: rest test ----------------------------------------------------------------------
 RING = HEAD + 88  # five blocks of 13 sums: count, rate 3, force 3, their squares 6: 65
 RING_BLOCK = 13
@@ -173,7 +173,7 @@ GAIN = DX + STRIDE
 S3 = GAIN + STRIDE  # small matrices
 F = S3 + STRIDE  # Phi - I of the nine inertial rows, 9 x m
 G = F + 200  # (Phi - I) P, 9 rows; in the smoother F^T Lam, m x n
-RECORD = G + 24 * STRIDE  # 1 while the tape runs
+RECORD = G + 24 * STRIDE  # 1 while the tape runs, 2 if it runs for the backward pass only
 NEXT = RECORD + 1  # next free place on the tape
 MOVED = RECORD + 2  # correction since the last mark on the tape
 TAPE = MOVED + STRIDE  # the tape begins here; also the length of w without a tape

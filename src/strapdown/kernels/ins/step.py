@@ -304,7 +304,8 @@ def step(
         set_status(x, s.OUTAGE)
     if x[AT_REST] > 0.0:
         set_status(x, s.REST)
-    publish(x, P, p)
+    if w[RECORD] < 2.0:
+        publish(x, P, p)
 
 
 # fmt: off

@@ -25,6 +25,7 @@ from strapdown.recording import Recording
 from strapdown.solution import COLUMNS, Diagnostics, Solution
 
 _NO_VECTOR: FloatArray = np.empty(0)
+_NO_ACC: FloatArray = np.full(3, np.inf)  # absent, as against bad
 _NO_TIMES: FloatArray = np.empty(0)
 _NO_ROWS: FloatArray = np.empty((0, 3))
 _NO_EVENTS: FloatArray = np.empty((0, 3))
@@ -106,7 +107,7 @@ class Tracker:
         self._t = -math.inf if math.isnan(state.t) else state.t
 
     def update(
-        self, t: float, gyr: ArrayLike, acc: ArrayLike, mag: ArrayLike | None = None
+        self, t: float, gyr: ArrayLike, acc: ArrayLike | None, mag: ArrayLike | None = None
     ) -> None:
         """Feed one sample.
 
@@ -116,8 +117,8 @@ class Tracker:
             Time [s], later than that of the sample before.
         gyr : array_like, shape (3,)
             Angular rate [rad/s]; float64 arrays are the quickest.
-        acc : array_like, shape (3,)
-            Specific force [m/s^2].
+        acc : array_like, shape (3,), or None
+            Specific force [m/s^2]; None where a slower accelerometer has no new sample.
         mag : array_like, shape (3,), optional
             Magnetic field [T], if there is a new one.
 
@@ -130,6 +131,8 @@ class Tracker:
             raise ValueError(f"`t` must increase, got {t} after {self._t}.")
         if mag is None:
             mag = _NO_VECTOR
+        if acc is None:
+            acc = _NO_ACC
         try:
             ok = self._update(self._x, self._P, self._p, self._w, t, gyr, acc, mag)
         except TypeError:  # not float64 vectors
@@ -290,7 +293,7 @@ class Estimator:
         state: State,
         t: float,
         gyr: ArrayLike,
-        acc: ArrayLike,
+        acc: ArrayLike | None,
         mag: ArrayLike | None = None,
         **aiding: ArrayLike,
     ) -> State:
@@ -302,8 +305,10 @@ class Estimator:
             After the sample before.
         t : float
             Time [s].
-        gyr, acc : array_like, shape (3,)
-            Angular rate [rad/s] and specific force [m/s^2].
+        gyr : array_like, shape (3,)
+            Angular rate [rad/s].
+        acc : array_like, shape (3,), or None
+            Specific force [m/s^2]; None where a slower accelerometer has no new sample.
         mag : array_like, shape (3,), optional
             Field [T] that came since the last sample.
         **aiding
@@ -328,6 +333,8 @@ class Estimator:
         update, p, w = self._ready()
         if mag is None:
             mag = _NO_VECTOR
+        if acc is None:
+            acc = _NO_ACC
         try:
             ok = update(x, P, p, w, t, gyr, acc, mag)
         except TypeError:  # not float64 vectors
@@ -415,7 +422,7 @@ def _as_kernel_input(
     return (
         _checks.finite("t", t),
         np.array(_checks.as_vector("gyr", gyr, allow_nan=True)),
-        np.array(_checks.as_vector("acc", acc, allow_nan=True)),
+        acc if acc is _NO_ACC else np.array(_checks.as_vector("acc", acc, allow_nan=True)),
         mag,
     )
 

@@ -3,7 +3,7 @@
 from math import inf
 
 from strapdown.kernels._jit import Mat, Vec, kernel
-from strapdown.kernels.memory import GO, W_HEAD, advance_attitude, begin, load, post, store
+from strapdown.kernels.memory import SKIP, W_HEAD, advance_attitude, begin, load, post, store
 
 W_SIZE = W_HEAD
 
@@ -18,7 +18,7 @@ def step(
     """Advance `x` by one sample: ``q_nb <- q_nb exp(omega dt)``, exact at constant rate."""
     # fmt: on
     todo, dt, wx, wy, wz, _, _ = begin(x, p, w, t, gx, gy, gz, ax, ay, az)
-    if todo >= GO:
+    if todo != SKIP:
         advance_attitude(x, wx * dt, wy * dt, wz * dt)
 
 

@@ -18,6 +18,7 @@ from strapdown.kernels.memory import (
     MAG,
     P_COS_D,
     P_HEAD,
+    P_MAX_GAP,
     P_SIN_D,
     SKIP,
     START,
@@ -244,14 +245,17 @@ def step(
     todo, dt, wx, wy, wz, has_acc, has_mag = begin(x, p, w, t, gx, gy, gz, ax, ay, az)
     if todo == SKIP:
         return
+    rx, ry, rz = (wx - x[BG]) * dt, (wy - x[BG + 1]) * dt, (wz - x[BG + 2]) * dt
+    advance_attitude(x, rx, ry, rz)
     if todo == START:
         reset_attitude(x, P, p)
         x[T_ACC] = x[T]
         x[T_MAG] = x[T]
         write_std(x, P)
         return
-    rx, ry, rz = (wx - x[BG]) * dt, (wy - x[BG + 1]) * dt, (wz - x[BG + 2]) * dt
-    advance_attitude(x, rx, ry, rz)
+    if dt == 0.0:  # the first sample of a given attitude: no interval, nothing to weigh by
+        x[T_ACC] = x[T]
+        x[T_MAG] = x[T]
     q_theta = p[P_GYR_NOISE] * p[P_GYR_NOISE] * dt
     if todo == WIDEN or (int(x[STATUS]) & s.SATURATED) != 0:
         unknown = p[P_GAP_RATE] * dt
@@ -266,7 +270,8 @@ def step(
         # acceleration then adds a zero-mean error, where a normalised one would bend it.
         k = -1.0 / p[P_GRAVITY]
         dx, dy, dz = down_in_body(x[Q], x[Q + 1], x[Q + 2], x[Q + 3])
-        r = k * k * p[P_ACC_NOISE] * p[P_ACC_NOISE] / (t - x[T_ACC])
+        # A sample stands for the time since the last one, but not for what a gap has hidden.
+        r = k * k * p[P_ACC_NOISE] * p[P_ACC_NOISE] / min(t - x[T_ACC], p[P_MAX_GAP])
         if not update_direction(P, w, D_ACC, dx, dy, dz, k * ax, k * ay, k * az, r, p[P_GATE]):
             set_status(x, s.ACC_REJECTED)
         x[T_ACC] = t
@@ -277,7 +282,7 @@ def step(
         dx, dy, dz = field_in_body(
             x[Q], x[Q + 1], x[Q + 2], x[Q + 3], mx, my, mz, p[P_COS_D], p[P_SIN_D]
         )
-        r = p[P_MAG_NOISE] * p[P_MAG_NOISE] / (t - x[T_MAG])
+        r = p[P_MAG_NOISE] * p[P_MAG_NOISE] / min(t - x[T_MAG], p[P_MAX_GAP])
         if not update_direction(P, w, D_MAG, dx, dy, dz, mx, my, mz, r, p[P_GATE]):
             set_status(x, s.MAG_REJECTED)
         x[T_MAG] = t

@@ -60,7 +60,7 @@ W_HEAD = 14
 
 # --- what `begin` asks of the filter ---------------------------------------------------------
 SKIP = 0  # nothing: no usable sample, or no attitude yet
-START = 1  # attitude was set just now: reset what depends on it
+START = 1  # attitude was set just now: propagate by dt, reset what depends on it
 GO = 2  # propagate by dt, then update
 WIDEN = 3  # propagate over a gap of dt, widen the covariance, then update
 
@@ -162,10 +162,19 @@ def set_status(x: Vec, bit: int) -> None:
     x[STATUS] = float(int(x[STATUS]) | bit)
 
 
+# fmt: off
 @kernel
-def heading_from_mag(x: Vec, cos_d: float, sin_d: float) -> float:
-    """Angle about down that turns the field of the inbox to its heading; NaN if vertical."""
-    hx, hy, hz = rotate(x[Q], x[Q + 1], x[Q + 2], x[Q + 3], x[MAG + 1], x[MAG + 2], x[MAG + 3])
+def heading_from_mag(
+    x: Vec, rx: float, ry: float, rz: float, cos_d: float, sin_d: float
+) -> float:
+    """Angle about down that turns the field of the inbox to its heading; NaN if vertical.
+
+    ``r_b`` is the rotation since the time of the attitude.
+    """
+    # fmt: on
+    ew, ea, eb, ec = exp(rx, ry, rz)
+    hx, hy, hz = rotate(ew, ea, eb, ec, x[MAG + 1], x[MAG + 2], x[MAG + 3])
+    hx, hy, hz = rotate(x[Q], x[Q + 1], x[Q + 2], x[Q + 3], hx, hy, hz)
     h2 = hx * hx + hy * hy
     angle = atan2(sin_d * hx - cos_d * hy, cos_d * hx + sin_d * hy)
     if not h2 > 1e-12 * (h2 + hz * hz):
@@ -188,6 +197,18 @@ def _level(x: Vec, ax: float, ay: float, az: float) -> None:
     cw, cx, cy, cz = from_two_vectors(fx, fy, fz, 0.0, 0.0, -1.0)
     w, a, b, c = mul(cw, cx, cy, cz, x[Q], x[Q + 1], x[Q + 2], x[Q + 3])
     x[Q], x[Q + 1], x[Q + 2], x[Q + 3] = normalize(w, a, b, c)
+
+
+@kernel
+def note(w: Vec, cell: int, ix: float, iy: float, iz: float, outcome: int) -> None:
+    """Write an innovation without stated sigma into the diagnostics."""
+    w[cell] = ix
+    w[cell + 1] = iy
+    w[cell + 2] = iz
+    w[cell + 3] = nan
+    w[cell + 4] = nan
+    w[cell + 5] = nan
+    w[cell + 6] = outcome
 
 
 # fmt: off
@@ -216,7 +237,7 @@ def begin(
             has_acc = False
             bits |= s.SATURATED
         if not has_acc:
-            w[D_ACC + 6] = s.REJECTED_INVALID
+            note(w, D_ACC, nan, nan, nan, s.REJECTED_INVALID)
     has_mag = x[MAG] > 0.0 and p[P_USE_MAG] > 0.0
     if has_mag:
         m2 = x[MAG + 1] * x[MAG + 1] + x[MAG + 2] * x[MAG + 2] + x[MAG + 3] * x[MAG + 3]
@@ -224,7 +245,7 @@ def begin(
             has_mag = False
             x[MAG] = 0.0
             bits |= s.MAG_INVALID
-            w[D_MAG + 6] = s.REJECTED_INVALID
+            note(w, D_MAG, nan, nan, nan, s.REJECTED_INVALID)
 
     if not gx * gx + gy * gy + gz * gz < MAX_RATE2 or (not t > x[T] and not isnan(x[T])):
         # No rate: the next valid sample integrates over this one. The field waits in the inbox.
@@ -268,12 +289,14 @@ def begin(
             todo = START
     elif todo == WIDEN and p[P_REALIGN] > 0.0:
         todo = START
+        dt = 0.0
         if has_acc:
             _level(x, ax, ay, az)
         if x[ALIGNED] == FULL:
             x[ALIGNED] = TILT
     if x[ALIGNED] == TILT and has_mag:
-        angle = heading_from_mag(x, p[P_COS_D], p[P_SIN_D])
+        rx, ry, rz = (wx - x[BG]) * dt, (wy - x[BG + 1]) * dt, (wz - x[BG + 2]) * dt
+        angle = heading_from_mag(x, rx, ry, rz, p[P_COS_D], p[P_SIN_D])
         if not isnan(angle):
             turn_heading(x, angle)
             x[ALIGNED] = FULL
@@ -282,18 +305,6 @@ def begin(
         bits |= s.ALIGNING
     x[STATUS] = float(bits)
     return todo, dt, wx, wy, wz, has_acc, has_mag
-
-
-@kernel
-def note(w: Vec, cell: int, ix: float, iy: float, iz: float, outcome: int) -> None:
-    """Write an innovation without stated sigma into the diagnostics."""
-    w[cell] = ix
-    w[cell + 1] = iy
-    w[cell + 2] = iz
-    w[cell + 3] = nan
-    w[cell + 4] = nan
-    w[cell + 5] = nan
-    w[cell + 6] = outcome
 
 
 @kernel

@@ -611,8 +611,7 @@ def run(
         j = load(x, t[k], j, t_mag, mag)
         step(x, P, p, w, t[k], gyr[k, 0], gyr[k, 1], gyr[k, 2], acc[k, 0], acc[k, 1], acc[k, 2])
         store(x, w, k, out, out_diag)
-    if t.shape[0] > 0:
-        load(x, inf, j, t_mag, mag)
+    load(x, inf, j, t_mag, mag)
 
 
 @kernel

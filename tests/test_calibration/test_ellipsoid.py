@@ -197,6 +197,12 @@ def test_samples_with_nan_are_left_out():
     assert_allclose(cal.ellipsoid(holes).bias, cal.ellipsoid(samples).bias, rtol=1e-12)
 
 
+@pytest.mark.parametrize("n", [50, 500, 20_000])
+def test_noise_in_one_pose_is_not_taken_for_a_sphere(n):
+    with pytest.raises(InputError, match="of its radius, as they do in one pose: turn the device"):
+        cal.ellipsoid(raw(np.tile([0.6, 0.0, -0.8], (n, 1))))
+
+
 def test_few_samples_and_a_constant_channel_are_refused():
     with pytest.raises(InputError, match="12 unknowns, got 5 poses"):
         cal.ellipsoid(raw(truth.directions(5)))

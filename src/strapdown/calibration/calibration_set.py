@@ -65,6 +65,11 @@ class Calibration:
         """
         records, temperatures = dict(self.records), dict(self.temperatures)
         for fit in fits:
+            if not isinstance(fit, (CalibrationRecord, TemperatureRecord)):
+                raise TypeError(
+                    "`fits` must hold CalibrationRecord and TemperatureRecord, got "
+                    f"{type(fit).__name__}."
+                )
             for other in (records.get(fit.sensor), temperatures.get(fit.sensor)):
                 if other is not None:
                     _require_same(
@@ -76,13 +81,8 @@ class Calibration:
                     )
             if isinstance(fit, CalibrationRecord):
                 records[fit.sensor] = fit
-            elif isinstance(fit, TemperatureRecord):
-                temperatures[fit.sensor] = fit
             else:
-                raise TypeError(
-                    "`fits` must hold CalibrationRecord and TemperatureRecord, got "
-                    f"{type(fit).__name__}."
-                )
+                temperatures[fit.sensor] = fit
         return Calibration(records=records, temperatures=temperatures)
 
     def save(self, path: str | PathLike[str]) -> None:
@@ -125,6 +125,7 @@ class Calibration:
             If there is a temperature model but no temperature in the recording.
         """
         done: dict[str, Any] = dict(rec.meta.get(APPLIED, {}))
+        notes = list(rec.meta.get("notes", ()))
         imu, mag = rec.imu, rec.mag
         for sensor, record in self.records.items():
             stream = rec.mag if sensor == "mag" else rec.imu
@@ -146,6 +147,11 @@ class Calibration:
                 )
             raw: FloatArray = getattr(stream, sensor)
             turn_on = self._turn_on(rec) if sensor == "gyr" and at_rest else None
+            if turn_on is not None:
+                notes.append(
+                    f"the gyroscope's bias is from the rest at {turn_on.t_start:.1f} s to "
+                    f"{turn_on.t_stop:.1f} s, in place of the calibrated one."
+                )
             bias = self._bias(rec, sensor, stream.t, turn_on)
             corrected = record.correct(raw, bias)
             if sensor == "mag":
@@ -165,7 +171,8 @@ class Calibration:
                 f"the calibration is for {wanted}, but the recording has {there}; use a "
                 "calibration of its sensors."
             )
-        return replace(rec, imu=imu, mag=mag, meta={**rec.meta, APPLIED: done})
+        meta = {**rec.meta, APPLIED: done, **({"notes": notes} if notes else {})}
+        return replace(rec, imu=imu, mag=mag, meta=meta)
 
     def _turn_on(self, rec: Recording) -> TurnOnBias | None:
         """Return the bias from the rest at the start, None if the log begins in motion."""

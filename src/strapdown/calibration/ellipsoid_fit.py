@@ -39,7 +39,7 @@ from strapdown.calibration.record import (
     rms,
 )
 from strapdown.calibration.sphere import coverage, fibonacci_sphere, unit_vectors
-from strapdown.errors import InputError
+from strapdown.errors import InputError, NotConverged
 from strapdown.units import DEG, UT
 
 NAMES = ("b_x", "b_y", "b_z", "a_xx", "a_yy", "a_zz", "a_xy", "a_xz", "a_yz")
@@ -47,6 +47,7 @@ HARD_IRON_LIMIT = 0.5 * UT  # three standard deviations along any direction
 DIRECTION_LIMIT = 1.0 * DEG  # three standard deviations of the worst direction
 SCALE_TOLERANCE = 0.05  # of the HMC5883L, by its datasheet
 _GOOD_COVERAGE = 0.85  # a record that covers more fails for another reason
+_SHELL = 0.1  # samples that scatter more, relative to the radius, lie on no shell
 _WHAT = "ellipsoid fit of the magnetometer"
 _ROWS, _COLUMNS = (0, 1, 2, 0, 0, 1), (0, 1, 2, 1, 2, 2)  # order of a_xx ... a_yz
 _PROBES = fibonacci_sphere(200)
@@ -92,9 +93,8 @@ def ellipsoid(
     Raises
     ------
     InputError
-        If the samples cover too little of the sphere to tell centre and shape.
-    NotConverged
-        If they lie on no ellipsoid.
+        If the samples cover too little of the sphere to tell centre and shape, or lie on no
+        ellipsoid.
 
     Notes
     -----
@@ -107,18 +107,24 @@ def ellipsoid(
     if not np.linalg.norm(np.ptp(samples, axis=0)) > 0.0:
         raise InputError(f"{_WHAT} needs samples that differ, all {len(samples)} are equal.")
 
-    advice = _advice(samples, h, A)
-    solution = gauss_newton(
-        lambda x: _model(x, samples, F),
-        np.concatenate((h, A[_ROWS, _COLUMNS])),
-        np.array([F] * 3 + [1.0] * 6),
-        NAMES,
-        what=_WHAT,
-        advice=advice,
-    )
+    advice = _advice(samples, h, A, F)
+    try:
+        solution = gauss_newton(
+            lambda x: _model(x, samples, F),
+            np.concatenate((h, A[_ROWS, _COLUMNS])),
+            np.array([F] * 3 + [1.0] * 6),
+            NAMES,
+            what=_WHAT,
+            advice=advice,
+        )
+    except NotConverged:
+        raise InputError(f"{_WHAT} found no ellipsoid; {advice}.") from None
     h, A = solution.x[:3], _symmetric(solution.x[3:])
-    if not (np.linalg.eigvalsh(A) > 0.05 * np.linalg.norm(A, 2)).all():
-        raise InputError(f"{_WHAT} found no ellipsoid; {_advice(samples, h, np.eye(3))}.")
+    if (
+        not (np.linalg.eigvalsh(A) > 0.05 * np.linalg.norm(A, 2)).all()
+        or _scatter(samples, h, A, F) > _SHELL
+    ):
+        raise InputError(f"{_WHAT} found no ellipsoid; {_advice(samples, h, A, F)}.")
 
     correlation = correlation_length(solution.residuals)
     covariance = solution.covariance() * correlation
@@ -136,7 +142,8 @@ def ellipsoid(
             "turn the device on the spot, away from iron and currents"
         )
     _refuse_if_loose(hard_iron_std, direction_std, hard_iron_limit, direction_limit, advice)
-    raw = np.linalg.norm(samples, axis=1)
+    before = np.linalg.norm(samples, axis=1)
+    before -= F if field is not None else before.mean()
     return CalibrationRecord(
         sensor="mag",
         method="ellipsoid",
@@ -145,10 +152,11 @@ def ellipsoid(
         parameters=_parameters(values, covariance, tolerances),
         covariance=covariance,
         residual_rms=rms(residuals),
-        residual_rms_before=rms(raw - (F if field is not None else raw.mean())),
+        residual_rms_before=rms(before),
         equations=len(samples),
         dof=solution.dof,
         residuals=residuals,
+        residuals_before=before,
         history=history,
         directions=unit_vectors("corrected", (samples - h) @ A),
         reference=F,
@@ -255,8 +263,19 @@ def _direction_std(A: FloatArray, F: float, covariance: FloatArray) -> FloatArra
     return out
 
 
-def _advice(samples: FloatArray, h: FloatArray, A: FloatArray) -> str:
+def _scatter(samples: FloatArray, h: FloatArray, A: FloatArray, F: float) -> float:
+    """Return the RMS distance from the ellipsoid as a share of its radius."""
+    return rms(np.linalg.norm((samples - h) @ A, axis=1) / F - 1.0)
+
+
+def _advice(samples: FloatArray, h: FloatArray, A: FloatArray, F: float) -> str:
     """Return what is covered and what to do, for messages."""
+    scatter = _scatter(samples, h, A, F)
+    if not scatter <= _SHELL:
+        return (
+            f"the samples scatter by {100.0 * scatter:.0f} % of its radius, as they do in one "
+            "pose: turn the device through all orientations"
+        )
     offsets = (samples - h) @ A
     spread = coverage(offsets[np.linalg.norm(offsets, axis=1) > 0.0])
     return f"{spread}: turn the device so that the field comes from there too"

@@ -8,7 +8,6 @@ and their comments.
 
 import datetime as dt
 import math
-import os
 from collections.abc import Iterable, Mapping
 from os import PathLike
 from pathlib import Path
@@ -30,6 +29,7 @@ from strapdown.calibration.record import (
     Verdict,
 )
 from strapdown.errors import FormatError, InputError
+from strapdown.io._atomic import written_aside
 from strapdown.units import UNITS, parse_unit
 
 FILE_TYPE: Final = "strapdown calibration"
@@ -47,7 +47,7 @@ _KEYS = {
 _OPTIONAL = {"sensor_id", "temp_degc", "reference", "quality", "fit", "verdict", "parameters",
              "covariance", "residual_rms", "residual_rms_before", "equations", "dof"}  # fmt: skip
 _PARAMETER_KEYS = {"value", "std", "unit", "tolerance", "nominal", "verdict"}
-_FIT_KEYS = {"residuals", "history", "directions"}
+_FIT_KEYS = {"residuals", "residuals_before", "history", "directions"}
 
 
 def load(path: str | PathLike[str], *, convert_units: bool = False) -> Calibration:
@@ -146,12 +146,9 @@ def _write(document: tomlkit.TOMLDocument, fits: Iterable[Fit], file: Path) -> N
             if "temperature" not in document:
                 document["temperature"] = tomlkit.table(is_super_table=True)
             document["temperature"][fit.sensor] = _temperature_table(fit)
-    aside = file.with_name(f".{file.name}.{os.getpid()}")
-    try:
-        aside.write_text(tomlkit.dumps(document), encoding="utf-8")
-        aside.replace(file)
-    finally:
-        aside.unlink(missing_ok=True)
+    text = tomlkit.dumps(document)
+    with written_aside(file) as stream:
+        stream.write(text.encode("utf-8"))
 
 
 def _calibration_table(record: CalibrationRecord) -> Any:
@@ -289,7 +286,9 @@ def _common(
     """Return the fields that all records share."""
     date = table["date"]
     if not isinstance(date, dt.date):
-        raise FormatError(f"`{place}.date` must be a date such as 2025-03-31, got {date!r}")
+        raise FormatError(
+            f"`{place}.date` must be a date such as 2025-03-31, got {date!r}", file=file
+        )
     rows = _table(table.get("parameters", {}), f"{place}.parameters", file)
     parameters = tuple(
         _parameter(name, row, table["unit"], sensor, factor, place, file)
@@ -324,6 +323,7 @@ def _common(
         "equations": table.get("equations", 0),
         "dof": table.get("dof", 0),
         "residuals": factor * np.asarray(fit.get("residuals", []), dtype=np.float64),
+        "residuals_before": factor * np.asarray(fit.get("residuals_before", []), dtype=np.float64),
         "history": history * scale if count else history,
         "directions": np.asarray(fit.get("directions", np.empty((0, 3))), dtype=np.float64),
         "quality": {k: float(v) for k, v in table.get("quality", {}).items()},

@@ -212,7 +212,9 @@ def _calibrate(
         )
     corrected = np.linalg.solve(S, (means - solution.x[:3]).T).T
     spread = coverage(corrected[turning])
-    before = np.linalg.norm(means[turning], axis=1) - references[turning]
+    before = np.concatenate(
+        (np.linalg.norm(means[turning], axis=1) - references[turning], *means[~turning].T)
+    )
     unit = SENSOR_UNITS[sensor]
     return CalibrationRecord(
         sensor=sensor,
@@ -232,6 +234,7 @@ def _calibrate(
         equations=equations,
         dof=solution.dof,
         residuals=residuals,
+        residuals_before=before,
         history=solution.history,
         directions=unit_vectors("corrected", corrected[turning]),
         reference=float(references[0]) if np.ptp(references) == 0.0 else None,

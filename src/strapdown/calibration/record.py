@@ -103,9 +103,9 @@ class Fit:
         RMS of the residuals after and before the calibration, in the sensor's unit.
     equations, dof : int
         Equations, and equations less unknowns.
-    residuals : ndarray
-        Residual of each equation in the sensor's unit, one row per pose or sample. Empty when
-        loaded from a file that left them out for their number.
+    residuals, residuals_before : ndarray
+        Residual of each equation in the sensor's unit, one row per pose or sample, after and
+        before the calibration. Empty when loaded from a file that left them out for their number.
     history : ndarray, shape (k, p)
         Parameters at the start and after each iteration; one row for a direct solution.
     directions : ndarray, shape (m, 3)
@@ -125,6 +125,7 @@ class Fit:
     equations: int = 0
     dof: int = 0
     residuals: FloatArray = field(default_factory=lambda: np.empty(0))
+    residuals_before: FloatArray = field(default_factory=lambda: np.empty(0))
     history: FloatArray = field(default_factory=lambda: np.empty((0, 0)))
     directions: FloatArray = field(default_factory=lambda: np.empty((0, 3)))
     quality: Mapping[str, float] = field(default_factory=dict)
@@ -139,7 +140,7 @@ class Fit:
         if not np.allclose(covariance, covariance.T, rtol=1e-6, atol=0.0, equal_nan=True):
             raise ValueError("`covariance` must be symmetric.")
         object.__setattr__(self, "covariance", covariance)
-        for name in ("residuals", "history", "directions"):
+        for name in ("residuals", "residuals_before", "history", "directions"):
             object.__setattr__(self, name, as_floats(name, getattr(self, name)))
         whole("equations", self.equations, 0)
         whole("dof", self.dof, 0)

@@ -147,6 +147,7 @@ def against_reference(
         equations=3 * len(y),
         dof=3 * dof,
         residuals=residuals,
+        residuals_before=y - B,
         history=values[np.newaxis],
         directions=unit_vectors("reference", B[np.linalg.norm(B, axis=1) > 0.0]),
         quality={

@@ -108,6 +108,7 @@ def temperature_model(
         equations=3 * len(T),
         dof=3 * dof,
         residuals=residuals,
+        residuals_before=y - y.mean(axis=0),
         history=values[np.newaxis],
         quality={"span_degc": span},
         slope=at_mean[0],

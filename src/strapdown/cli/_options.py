@@ -129,33 +129,59 @@ class Source:
             return rec
 
 
+Sources = tuple[Source, ...]
+
+
 def reads_log(verb: Callable[..., None]) -> Callable[..., None]:
     """Give a verb that takes a `Source` as ``source`` the options that make one up."""
-    own = inspect.signature(verb).parameters
     log = Annotated[
         Path | None,
         typer.Argument(metavar="LOG", help="File or folder.", show_default=False),
     ]
-    shared = {"log": log, **_SENSOR_FILES, **_READ_OPTIONS}
+    return _with_reading_options(verb, "source", log, lambda sources: sources[0])
+
+
+def reads_logs(verb: Callable[..., None]) -> Callable[..., None]:
+    """Give a verb that takes several of them as ``sources`` the options that make them up."""
+    logs = Annotated[
+        list[Path] | None,
+        typer.Argument(metavar="LOG...", help="Files or folders.", show_default=False),
+    ]
+    return _with_reading_options(verb, "sources", logs, lambda sources: sources)
+
+
+def _with_reading_options(
+    verb: Callable[..., None],
+    name: str,
+    argument: Any,
+    value: Callable[[Sources], "Source | Sources"],
+) -> Callable[..., None]:
+    """Return the command of a verb, whose parameter `name` is made from options."""
+    own = inspect.signature(verb).parameters
+    shared = {"log": argument, **_SENSOR_FILES, **_READ_OPTIONS}
 
     def command(**given: Any) -> None:
-        files = {name: given.pop(name) for name in _SENSOR_FILES}
-        options = {name: given.pop(name) for name in _READ_OPTIONS}
-        source = Source(
-            log=given.pop("log"),
-            files={name: path for name, path in files.items() if path is not None},
-            options={name: value for name, value in options.items() if value is not None},
+        files = {key: given.pop(key) for key in _SENSOR_FILES}
+        options = {key: given.pop(key) for key in _READ_OPTIONS}
+        logs = given.pop("log")
+        sources = tuple(
+            Source(
+                log=log,
+                files={key: path for key, path in files.items() if path is not None},
+                options={key: option for key, option in options.items() if option is not None},
+            )
+            for log in (logs if isinstance(logs, list) and logs else [logs or None])
         )
-        verb(source=source, **given)
+        verb(**{name: value(sources)}, **given)
 
-    def parameter(name: str, annotation: Any, default: Any = None) -> inspect.Parameter:
+    def parameter(key: str, annotation: Any, default: Any = None) -> inspect.Parameter:
         kind = inspect.Parameter.KEYWORD_ONLY
-        return inspect.Parameter(name, kind, annotation=annotation, default=default)
+        return inspect.Parameter(key, kind, annotation=annotation, default=default)
 
     own_parameters = [
-        parameter(p.name, p.annotation, p.default) for p in own.values() if p.name != "source"
+        parameter(p.name, p.annotation, p.default) for p in own.values() if p.name != name
     ]
-    first, *others = (parameter(name, annotation) for name, annotation in shared.items())
+    first, *others = (parameter(key, annotation) for key, annotation in shared.items())
     parameters = [first, *own_parameters, *others]
     command.__name__, command.__doc__ = verb.__name__, verb.__doc__
     command.__annotations__ = {p.name: p.annotation for p in parameters}

@@ -79,7 +79,7 @@ def identify(y: ArrayLike, fs: float, *, name: str = "y") -> Coefficients:
     >>> import numpy as np
     >>> found = identify(np.random.default_rng(1).normal(0.0, 0.1, 100_000), 100.0)
     >>> round(found.N.value, 4), found.K.status.value
-    (0.01, 'not observable')
+    (0.0099, 'not observable')
     """
     samples = as_series(name, y)
     fs = positive("fs", fs)

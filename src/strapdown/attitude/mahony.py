@@ -19,8 +19,8 @@ class Mahony(AttitudeEstimator):
     """Mahony filter: a proportional-integral pull along the cross product of directions.
 
     State: q_nb and gyro bias. The error is the sum of the cross products of measured and
-    predicted directions of gravity and field; the field's reference takes the measured dip, so
-    that it corrects the heading only.
+    predicted directions of gravity and field. The field's reference takes the measured dip: an
+    error of dip changes nothing, one of heading pulls on the tilt as well.
 
     Parameters
     ----------
@@ -32,7 +32,7 @@ class Mahony(AttitudeEstimator):
 
     Notes
     -----
-    Online. A heading error decays with ``kp`` times the squared cosine of the field's dip.
+    Online. A heading error decays as ``exp(-kp (1 - sin dip) t)`` with the dip of the field.
 
     References
     ----------

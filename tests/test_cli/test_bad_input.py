@@ -1,8 +1,11 @@
 """Each kind of bad input: one sentence, exit status 2, nothing half written."""
 
+import errno
 import gzip
+import json
 import os
 import re
+import tempfile
 
 import numpy as np
 import pytest
@@ -233,8 +236,6 @@ def test_all_nan_stream_is_refused(command, tmp_path):
 
 
 def test_bursts_of_nan_are_skipped_and_counted(command, tmp_path):
-    import json
-
     rows = logs.table()
     rows[100:110, 2] = np.nan
     rows[150, 7:10] = 0.0
@@ -252,13 +253,24 @@ def test_repair_is_the_way_out_of_repeated_times(command, tmp_path):
     assert command("run", log, "--repair-time", "drop", "--no-report").status == 0
 
 
-@pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")
-def test_folder_without_permission_is_told(process, tmp_path):
-    closed = tmp_path / "closed"
-    closed.mkdir(mode=0o500)
-    done = process("demo", "-o", closed / "out")
+def test_folder_without_permission_is_told(command, tmp_path, monkeypatch):
+    def refuse(**_: object) -> str:  # root, as in containers, may write anywhere
+        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), "a random name")
+
+    monkeypatch.setattr(tempfile, "mkdtemp", refuse)
+    done = command("demo", "-o", tmp_path / "closed" / "out")
     assert (done.status, done.out) == (2, "")
     assert re.search(r"closed: permission denied; .*-o", done.line), done.line
+
+
+def test_full_disk_is_a_failed_computation(command, tmp_path, monkeypatch):
+    def refuse(**_: object) -> str:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), "a random name")
+
+    monkeypatch.setattr(tempfile, "mkdtemp", refuse)
+    done = command("demo", "-o", tmp_path / "out")
+    assert (done.status, done.out) == (1, "")
+    assert re.search("no space left on device; free some space", done.line), done.line
 
 
 def test_folder_that_cannot_be_made_is_told(process):

@@ -299,7 +299,7 @@ def test_a_gap_is_flagged_widens_the_deviations_and_is_recovered_from(scene):
 
 def test_attitude_is_not_smoothed_across_a_gap(scene):
     """Only constants of the sensors, found better by the whole, cross it."""
-    rec, r_nb, _ = scene
+    rec, _, _ = scene
     first = RobustEskf().smooth(rec.between(0.0, 25.0))
     both = RobustEskf().smooth(with_data(rec, np.r_[0:2500, 3000:6000]))
     turned = hand.rotvec_off(both.q_nb[:2500], Rotation.from_quat(first.q_nb[:, [1, 2, 3, 0]]))
@@ -389,6 +389,18 @@ def test_the_smoother_beats_the_filter_and_says_so(scene):
     assert np.all(smoothed.std_attitude_n[moving] <= filtered.std_attitude_n[moving] * 1.05)
     # all of the log knows the bias of its beginning
     assert np.all(smoothed.std_gyr_bias[0] < 0.1 * filtered.std_gyr_bias[0])
+
+
+def test_an_unknown_latency_widens_the_deviations_across_the_rate(scene):
+    """Tilt of a shift in time: the rate about north and east, times the deviation of the shift."""
+    rec, r_nb, _ = scene
+    plain = replace(RobustEskf(), timing_std=0.0).run(rec)
+    wide = replace(RobustEskf(), timing_std=0.02).run(rec)
+    np.testing.assert_array_equal(plain.q_nb, wide.q_nb)
+    rate_n = r_nb.apply(rec.imu.gyr - wide.gyr_bias)
+    want = np.hypot(plain.std_attitude_n[:, :2], 0.02 * np.abs(rate_n[:, :2]))
+    # scale and misalignment found so far are a few 0.1 %, attitude is off by less than a degree
+    np.testing.assert_allclose(wide.std_attitude_n[1000:, :2], want[1000:], rtol=0.02, atol=1e-3)
 
 
 def test_the_smoothed_attitude_has_no_steps(scene):

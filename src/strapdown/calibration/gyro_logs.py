@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from strapdown import motion
-from strapdown._types import FloatArray
+from strapdown._types import BoolArray, FloatArray
 from strapdown.calibration.encoder import body_rates
 from strapdown.calibration.place import reference_attitude
 from strapdown.calibration.poses import find_turntable_positions
@@ -16,7 +16,8 @@ from strapdown.recording import Recording
 from strapdown.rotation import interpolate, quat_conj, quat_mul, rotvec_from_quat, rpy_from_quat
 from strapdown.units import DPS
 
-_RATE_WINDOW = 0.1  # [s] over which gyroscope and reference are compared
+_RATE_WINDOW = 0.1  # [s], longest over which gyroscope and reference are compared
+_WINDOW_TURN = 0.1  # [rad] in a window: rotations of this size nearly commute
 _STANDING = 10.0 * DPS  # a slower turntable stands; bias alone may show as much
 
 
@@ -70,27 +71,42 @@ def table_positions(
 def rates_and_reference(rec: Recording, resolution: float | None) -> tuple[FloatArray, FloatArray]:
     """Return mean gyroscope rates and those of the reference attitude, window by window."""
     imu, (t, q_nb) = rec.need("imu"), reference_attitude(rec)
+    known = _between_samples(imu.t, t)
     if resolution is not None:
         rpy = np.unwrap(rpy_from_quat(q_nb), axis=0)
         rates = body_rates(t, rpy, resolution)
-        inside = (imu.t >= t[0]) & (imu.t <= t[-1])
-        at = imu.t[inside]
+        at = imu.t[known]
         true = np.column_stack([np.interp(at, t, rates[:, i]) for i in range(3)])
-        return imu.gyr[inside], true
+        return imu.gyr[known], true
     # gyr[k] covers (t[k-1], t[k]], so its sum over a window is the turn between two samples.
-    step = max(1, round(_RATE_WINDOW / float(np.median(np.diff(imu.t)))))
-    rows = np.flatnonzero((imu.t >= t[0]) & (imu.t <= t[-1]))[::step]
-    if len(rows) < 2:
+    speed = float(np.sqrt(np.nanmean(np.sum(imu.gyr**2, axis=1))))
+    window = min(_RATE_WINDOW, _WINDOW_TURN / max(speed, 1e-9))
+    step = max(1, round(window / float(np.median(np.diff(imu.t)))))
+    rows = np.arange(0, len(imu.t), step)
+    whole = known & ~np.isnan(imu.gyr).any(axis=1)
+    lost = np.concatenate(([0], np.cumsum(~whole)))
+    good = lost[rows[1:] + 1] == lost[rows[:-1]]
+    first, last = rows[:-1][good], rows[1:][good]
+    if not len(first):
         raise InputError("the reference attitude must overlap the gyroscope in time; it does not.")
-    q = interpolate(imu.t[rows], t, q_nb)
-    turn = rotvec_from_quat(quat_mul(quat_conj(q[:-1]), q[1:]))
-    span = imu.t[rows[1:]] - imu.t[rows[:-1]]
-    weighted = imu.gyr[1:] * np.diff(imu.t)[:, np.newaxis]
-    sums = np.vstack((np.zeros((1, 3)), np.cumsum(np.nan_to_num(weighted), axis=0)))
-    mean = (sums[rows[1:]] - sums[rows[:-1]]) / span[:, np.newaxis]
-    bad = np.concatenate(([0], np.cumsum(np.isnan(imu.gyr[1:]).any(axis=1))))
-    mean[bad[rows[1:]] > bad[rows[:-1]]] = np.nan
-    return mean, turn / span[:, np.newaxis]
+    turn = rotvec_from_quat(
+        quat_mul(quat_conj(interpolate(imu.t[first], t, q_nb)), interpolate(imu.t[last], t, q_nb))
+    )
+    span = (imu.t[last] - imu.t[first])[:, np.newaxis]
+    weighted = np.nan_to_num(imu.gyr[1:]) * np.diff(imu.t)[:, np.newaxis]
+    sums = np.vstack((np.zeros((1, 3)), np.cumsum(weighted, axis=0)))
+    return (sums[last] - sums[first]) / span, turn / span
+
+
+def _between_samples(t: FloatArray, t_reference: FloatArray) -> BoolArray:
+    """Return which times lie between two reference samples that follow on each other."""
+    after = np.searchsorted(t_reference, t, side="left")
+    inside = (after < len(t_reference)) & (t >= t_reference[0])
+    after = np.clip(after, 1, len(t_reference) - 1)
+    gap = t_reference[after] - t_reference[after - 1]
+    return np.asarray(
+        inside & (gap <= max(_RATE_WINDOW, 3.0 * float(np.median(np.diff(t_reference)))))
+    )
 
 
 def bias_at_rest(recs: Sequence[Recording], about: Mapping[str, Any]) -> CalibrationRecord:

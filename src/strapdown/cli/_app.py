@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from strapdown import __version__
-from strapdown.cli import _console, _errors, calibrate, convert, demo, filters, info, run
+from strapdown.cli import _console, _errors, calibrate, compare, convert, demo, filters, info, run
 
 app = typer.Typer(
     name="strapdown",
@@ -22,6 +22,7 @@ app.command("run")(run.run)
 app.command("demo")(demo.demo)
 app.command("info")(info.info)
 app.command("convert")(convert.convert)
+app.command("compare")(compare.compare)
 app.command("filters")(filters.filters)
 app.add_typer(calibrate.app, name="calibrate")
 

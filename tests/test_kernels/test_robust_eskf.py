@@ -112,6 +112,33 @@ def test_propagation_is_the_congruence_with_the_transition():
     assert np.array_equal(got, got.T)
 
 
+def test_a_sample_turns_the_attitude_by_the_corrected_rate():
+    """``q exp((I + M)(gyr - b) dt)`` by SciPy, and the sums that go with it."""
+    from strapdown.attitude import RobustEskf
+
+    rng = np.random.default_rng(8)
+    flt = RobustEskf()
+    (x, P), p, w = flt._memory(), flt._params(), np.zeros(k.W_SIZE)
+    rest = (0.0, 0.0, 0.0, 1.0, 2.0, -9.5)
+    k.step(x, P, p, w, 0.0, *rest)
+    k.step(x, P, p, w, 0.02, *rest)
+    mg, bias = 0.01 * rng.standard_normal((3, 3)), 0.1 * rng.standard_normal(3)
+    x[k.MG : k.MG + 9], x[m.BG : m.BG + 3] = mg.ravel(), bias
+    before = Rotation.from_quat(x[k.ATT : k.ATT + 4][[1, 2, 3, 0]])
+    old, gyr, acc = x.copy(), rng.standard_normal(3), 9.0 * rng.standard_normal(3)
+    k.step(x, P, p, w, 0.04, *gyr, *acc)
+    turned = 0.02 * (np.eye(3) + mg) @ (gyr - bias)
+    after = before * Rotation.from_rotvec(turned)
+    got = Rotation.from_quat(x[k.ATT : k.ATT + 4][[1, 2, 3, 0]])
+    assert (after.inv() * got).magnitude() < 1e-14
+    f_n = after.apply(acc - old[m.BA : m.BA + 3])
+    gained = 0.02 * (f_n + [0, 0, flt.gravity])
+    np.testing.assert_allclose(x[m.V : m.V + 3] - old[m.V : m.V + 3], gained, atol=1e-14)
+    sums = x[k.OPEN : k.OPEN + c.INTERVAL] - old[k.OPEN : k.OPEN + c.INTERVAL]
+    want = np.concatenate((0.02 * after.as_matrix().ravel(), turned, 0.02 * f_n, [0.02]))
+    np.testing.assert_allclose(sums, want, atol=1e-14)
+
+
 @pytest.mark.parametrize(("i", "h_lag"), [(2, 0.7), (3, 0.0), (8, 0.0)])
 def test_entering_a_scalar_is_the_joseph_update(i, h_lag):
     rng = np.random.default_rng(4)
@@ -154,6 +181,15 @@ def test_heading_of_the_field_falls_with_the_delay_as_its_row_says():
     np.testing.assert_allclose(row, -(z(d0 + 1e-6) - z(d0 - 1e-6)) / 2e-6, rtol=1e-8)
 
 
+# What a reset before an interval leaves of the error state: nothing of attitude and velocity, or
+# nothing of heading.
+FORGOTTEN = {
+    0: np.eye(N),
+    1: np.diag([0.0] * 6 + [1.0] * (N - 6)),
+    2: np.diag([1.0, 1.0, 0.0] + [1.0] * (N - 3)),
+}
+
+
 def dense_smoother(r, count, P0, P_before):
     """Rauch, Tung and Striebel with full matrices and inverses, from the recorded intervals."""
     means, covs, pred, phis = [], [], [], []
@@ -169,7 +205,8 @@ def dense_smoother(r, count, P0, P_before):
         means.append(x)
         covs.append(P)
         pred.append(P_before[n])
-        phis.append(written_out(r[n, k.R_SUMS - k.RECORD : k.R_SUMS - k.RECORD + c.INTERVAL]))
+        sums = r[n, k.R_SUMS - k.RECORD : k.R_SUMS - k.RECORD + c.INTERVAL]
+        phis.append(written_out(sums) @ FORGOTTEN[int(r[n, k.R_RESET - k.RECORD])])
     xs, Ps = [np.zeros(N)], [covs[-1]]
     for n in range(count - 2, -1, -1):
         gain = covs[n] @ phis[n + 1].T @ np.linalg.pinv(pred[n + 1], rcond=1e-18)
@@ -178,7 +215,8 @@ def dense_smoother(r, count, P0, P_before):
     return np.array(xs), np.array(Ps)
 
 
-def test_backward_pass_agrees_with_rauch_tung_and_striebel():
+@pytest.mark.parametrize("reset", [0, 1, 2])
+def test_backward_pass_agrees_with_rauch_tung_and_striebel(reset):
     """Same intervals, no adjoint: gains with inverses of full covariances."""
     rng = np.random.default_rng(7)
     count, records = 6, np.zeros((6, k.RECORD_SIZE))
@@ -186,6 +224,9 @@ def test_backward_pass_agrees_with_rauch_tung_and_striebel():
     P0, before = P.copy(), []
     for n in range(count):
         sums = some_sums(rng)
+        if n == 3:
+            records[n, k.R_RESET - k.RECORD] = reset
+            P = FORGOTTEN[reset] @ P @ FORGOTTEN[reset] + np.eye(N) - FORGOTTEN[reset]
         P = written_out(sums) @ P @ written_out(sums).T + np.diag(rng.uniform(0.01, 0.1, N))
         P = 0.5 * (P + P.T)
         before.append(P.copy())

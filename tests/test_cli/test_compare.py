@@ -13,7 +13,7 @@ def two_logs(tmp_path):
     """Two demo logs with their truth as reference."""
     paths = [tmp_path / "first.parquet", tmp_path / "second.parquet"]
     for seed, path in enumerate(paths):
-        sd.write(sd.simulation.demo.recording(duration=8.0, seed=seed), path)
+        sd.write(sd.simulation.demo.recording(duration=14.0, seed=seed), path)
     return paths
 
 
@@ -54,10 +54,10 @@ def test_the_report_is_one_page_with_all_names(command, two_logs, tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "line"),
     [
-        (("--filters", "madgwik"), "did you mean 'madgwick'"),
+        (("--filters", "madgwik"), "the nearest name is 'madgwick'"),
         (("--filters", ","), "--filters must name at least one estimator"),
         (("--filters", "mekf", "--set", "beta=1"), "must begin with one of mekf and a dot"),
-        (("--filters", "mekf", "--set", "mekf.gat=1"), "did you mean 'gate'"),
+        (("--filters", "mekf", "--set", "mekf.gat=1"), "the nearest name is 'gate'"),
         (("--set", "mekf.gate=1"), "--set needs --filters"),
     ],
 )
@@ -68,7 +68,7 @@ def test_wrong_options_end_in_one_line(command, two_logs, arguments, line):
 
 
 def test_a_log_without_reference_says_so(command, tmp_path):
-    rec = sd.simulation.demo.recording(duration=2.0)
+    rec = sd.simulation.demo.recording(duration=12.0)
     bare = sd.from_arrays(rec.imu.t, rec.imu.gyr, rec.imu.acc)
     sd.write(bare, tmp_path / "bare.parquet")
     done = command("compare", "bare.parquet", "--filters", "mekf")

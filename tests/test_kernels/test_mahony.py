@@ -62,7 +62,7 @@ def test_tilt_error_decays_as_exp_minus_kp_t(kp):
 
 
 def test_heading_and_tilt_decay_together_as_the_linearised_filter_does():
-    """A field that is off in heading pulls on the tilt as well: rates kp (1 - sin dip), kp (1 + ...).
+    """A field that is off in heading pulls on the tilt too; the slowest rate is kp (1 - sin dip).
 
     With the unit field (c, 0, s) and the observed heading ``phi_d - phi_n s / c`` the sum of the
     cross products is ``(phi_n, phi_e, 0) + (phi_d - phi_n s / c) (-c s, 0, c^2)``.

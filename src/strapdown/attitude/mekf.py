@@ -26,12 +26,12 @@ class Mekf(AttitudeEstimator):
     """Multiplicative EKF: attitude and gyro bias from accelerometer and field directions.
 
     State: q_nb and gyro bias; error state ``(dtheta_b, dbg)`` with
-    ``q_nb_true = q_nb exp(dtheta_b)``. The bias is a random walk. Directions of gravity and
-    field enter as three scalars each, in Joseph form. The specific force is scaled by gravity,
-    not normalised, so that linear accelerations average out. The field's reference takes the
-    measured dip, so that it corrects the heading only. An innovation beyond `gate` sigma is
-    weighted down until it lies on the gate, and flagged: its pull is bounded, and the filter
-    always recovers.
+    ``q_nb_true = q_nb exp(dtheta_b)``. The bias is a random walk. Measurements enter as scalars in
+    Joseph form: three of the direction of gravity, one of the field's heading. The specific force
+    is scaled by gravity, not normalised, so that linear accelerations average out. The field's
+    reference takes the measured dip, so that dip is no measurement. An innovation beyond `gate`
+    sigma is weighted down until it lies on the gate, and flagged: its pull is bounded, and the
+    filter always recovers.
 
     Parameters
     ----------

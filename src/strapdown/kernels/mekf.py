@@ -4,7 +4,7 @@ Error state ``(dtheta_b, dbg)``: ``q_nb_true = q_nb exp(dtheta_b)``, ``b_g_true 
 `P` is its covariance, 6x6. Measurements enter one scalar at a time in Joseph form.
 """
 
-from math import inf, pi, sqrt
+from math import inf, isnan, nan, pi, sqrt
 
 from strapdown.kernels import status as s
 from strapdown.kernels._jit import Mat, Vec, kernel
@@ -32,7 +32,9 @@ from strapdown.kernels.memory import (
     advance_attitude,
     begin,
     field_in_body,
+    heading_from_mag,
     load,
+    note,
     note_sigma,
     post,
     set_status,
@@ -159,24 +161,49 @@ def update_scalar(
 # fmt: off
 @kernel
 def update_direction(
-    P: Mat, w: Vec, cell: int,
+    P: Mat, w: Vec,
     dx: float, dy: float, dz: float,
     mx: float, my: float, mz: float,
     r: float, gate: float,
 ) -> bool:
     """Update with the measured unit vector m of a direction d predicted in b.
 
-    ``m = d + d x dtheta_b``, so the rows of H are those of ``[d]``. Diagnostics go to `cell`.
+    ``m = d + d x dtheta_b``, so the rows of H are those of ``[d]``.
     """
     # fmt: on
     a, va, ok_a = update_scalar(P, w, 0.0, -dz, dy, mx - dx, r, gate)
     b, vb, ok_b = update_scalar(P, w, dz, 0.0, -dx, my - dy, r, gate)
     c, vc, ok_c = update_scalar(P, w, -dy, dx, 0.0, mz - dz, r, gate)
-    note_sigma(w, cell, 0, a, va)
-    note_sigma(w, cell, 1, b, vb)
-    note_sigma(w, cell, 2, c, vc)
+    note_sigma(w, D_ACC, 0, a, va)
+    note_sigma(w, D_ACC, 1, b, vb)
+    note_sigma(w, D_ACC, 2, c, vc)
     accepted = ok_a and ok_b and ok_c
-    w[cell + 6] = s.ACCEPTED if accepted else s.REJECTED_GATE
+    w[D_ACC + 6] = s.ACCEPTED if accepted else s.REJECTED_GATE
+    return accepted
+
+
+# fmt: off
+@kernel
+def update_heading(
+    P: Mat, w: Vec, angle: float,
+    ux: float, uy: float, uz: float,
+    dx: float, dy: float, dz: float,
+    r: float, gate: float,
+) -> bool:
+    """Update with the angle by which the field d in b is off its heading; down is u in b.
+
+    ``m = d + d x dtheta_b`` across the heading only: along it and in dip the measured field
+    agrees with its reference by construction, which tells nothing. An error of tilt shows as one
+    of heading too; the row knows. Diagnostics: the second component is the one to the east.
+    """
+    # fmt: on
+    ex, ey, ez = uy * dz - uz * dy, uz * dx - ux * dz, ux * dy - uy * dx
+    h = sqrt(ex * ex + ey * ey + ez * ez)
+    ex, ey, ez = ex / h, ey / h, ez / h
+    hx, hy, hz = dy * ez - dz * ey, dz * ex - dx * ez, dx * ey - dy * ex
+    left, expected, accepted = update_scalar(P, w, hx, hy, hz, h * angle, r, gate)
+    note(w, D_MAG, nan, nan, nan, s.ACCEPTED if accepted else s.REJECTED_GATE)
+    note_sigma(w, D_MAG, 1, left, expected)
     return accepted
 
 
@@ -272,7 +299,7 @@ def step(
         dx, dy, dz = down_in_body(x[Q], x[Q + 1], x[Q + 2], x[Q + 3])
         # A sample stands for the time since the last one, but not for what a gap has hidden.
         r = k * k * p[P_ACC_NOISE] * p[P_ACC_NOISE] / min(t - x[T_ACC], p[P_MAX_GAP])
-        if not update_direction(P, w, D_ACC, dx, dy, dz, k * ax, k * ay, k * az, r, p[P_GATE]):
+        if not update_direction(P, w, dx, dy, dz, k * ax, k * ay, k * az, r, p[P_GATE]):
             set_status(x, s.ACC_REJECTED)
         x[T_ACC] = t
     if has_mag and t > x[T_MAG]:
@@ -282,10 +309,13 @@ def step(
         dx, dy, dz = field_in_body(
             x[Q], x[Q + 1], x[Q + 2], x[Q + 3], mx, my, mz, p[P_COS_D], p[P_SIN_D]
         )
+        ux, uy, uz = down_in_body(x[Q], x[Q + 1], x[Q + 2], x[Q + 3])
+        angle = heading_from_mag(x, 0.0, 0.0, 0.0, p[P_COS_D], p[P_SIN_D])
         r = p[P_MAG_NOISE] * p[P_MAG_NOISE] / min(t - x[T_MAG], p[P_MAX_GAP])
-        if not update_direction(P, w, D_MAG, dx, dy, dz, mx, my, mz, r, p[P_GATE]):
-            set_status(x, s.MAG_REJECTED)
-        x[T_MAG] = t
+        if not isnan(angle):
+            if not update_heading(P, w, angle, ux, uy, uz, dx, dy, dz, r, p[P_GATE]):
+                set_status(x, s.MAG_REJECTED)
+            x[T_MAG] = t
     inject(x, w)
     write_std(x, P)
 

@@ -103,7 +103,7 @@ def test_strength_of_the_field_comes_from_place_and_day():
     outcome = from_recordings.magnetometer([rec])
     strength = np.linalg.norm(earth.magnetic_field(PADOVA, dt.date(2025, 3, 31)).field_n)
     assert outcome.records[0].reference == pytest.approx(strength, rel=1e-6)
-    assert f"{strength / UT:.1f}" in outcome.notes[0]
+    assert f"{strength / UT:.2f} uT" in outcome.notes[0]
     without = Recording(mag=rec.mag, meta={"lat_rad": PADOVA[0], "lon_rad": PADOVA[1]})
     assert "give it with `--date`" in from_recordings.magnetometer([without]).notes[0]
 

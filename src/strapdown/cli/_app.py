@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from strapdown import __version__
-from strapdown.cli import _console, _errors, calibrate, compare, convert, demo, filters, info, run
+from strapdown.cli import _console, _errors, calibrate, compare, convert, demo, filters, info, run, simulate
 
 app = typer.Typer(
     name="strapdown",
@@ -25,6 +25,7 @@ app.command("convert")(convert.convert)
 app.command("compare")(compare.compare)
 app.command("filters")(filters.filters)
 app.add_typer(calibrate.app, name="calibrate")
+app.command("simulate")(simulate.simulate)
 
 
 def _version(wanted: bool) -> None:

@@ -179,8 +179,9 @@ class Estimator:
     pieces, single samples and the tracker follow from them.
     """
 
-    __slots__ = ("_kept",)
+    __slots__ = ("_kept", "_sizes")
     _kept: tuple[Any, FloatArray, FloatArray]  # what `_ready` makes; not a parameter
+    _sizes: tuple[tuple[int, ...], tuple[int, ...]]
     NAME: ClassVar[str]
     OUTPUTS: ClassVar[tuple[str, ...]] = ("q_nb", "gyr_bias")
 
@@ -381,7 +382,22 @@ class Estimator:
         """Return the state if it is this estimator's; a restored name may be an array."""
         if state.name != self.NAME:
             raise ValueError(f"`state` must belong to {self.NAME}, got one of {state.name}.")
+        if (state.x.shape, state.P.shape) != self._shapes():  # kernels check no index
+            x, P = self._shapes()
+            raise ValueError(
+                f"`state` must have x of shape {x} and P of shape {P}, got {state.x.shape} and "
+                f"{state.P.shape}; another version or other parameters may have made it."
+            )
         return state
+
+    def _shapes(self) -> tuple[tuple[int, ...], tuple[int, ...]]:
+        """Return the shapes of `x` and `P`, made once."""
+        try:
+            return self._sizes
+        except AttributeError:
+            x, P = self._memory()
+            object.__setattr__(self, "_sizes", (x.shape, P.shape))
+            return x.shape, P.shape
 
     def _events(self, rec: Recording) -> FloatArray:
         """Return the rare aiding that the estimator uses, as rows for `load_events`."""

@@ -19,7 +19,6 @@ from strapdown.noise.static import StaticStatistics, full_statistics, static_sta
 from strapdown.noise.stillness import require_signal, require_still
 from strapdown.recording import Recording
 
-_GAP: Final = 1.5  # median intervals that make a gap
 _LEAST_SHARE: Final = 0.5  # of a log that has to be left between gaps
 
 
@@ -92,12 +91,12 @@ def characterize(
             )
         fs = (len(t) - 1) / float(t[-1] - t[0])
         channels = [np.ascontiguousarray(samples[:, k]) for k in range(3)]
-        for letter, y in zip(AXES, channels, strict=True):
-            require_signal(f"{name} {letter}", y)
+        for letter, channel in zip(AXES, channels, strict=True):
+            require_signal(f"{name} {letter}", channel)
         require_still(name, samples, fs, float(t[0]))
         statistics = static_statistics(samples)
-        curves[name] = tuple(allan_deviation(y, fs) for y in channels)
-        spectra[name] = tuple(power_density(y, fs) for y in channels)
+        curves[name] = tuple(allan_deviation(channel, fs) for channel in channels)
+        spectra[name] = tuple(power_density(channel, fs) for channel in channels)
         readings[name] = tuple(read_off(curve) for curve in curves[name])
         x, y, z = (
             AxisNoise(
@@ -165,11 +164,10 @@ def _channels(rec: Recording, name: str) -> tuple[FloatArray, FloatArray]:
 
 def _unbroken(name: str, t: FloatArray, samples: FloatArray) -> tuple[slice, tuple[str, ...]]:
     """Return the rows of the longest stretch without a gap or a NaN, and what was left out."""
-    good: BoolArray = np.isfinite(samples).all(axis=1)
+    good: BoolArray = np.asarray(np.isfinite(samples).all(axis=1))
     if len(t) < 2:
         return slice(0, len(t)), ()
-    median = float(np.median(np.diff(t)))
-    ends = np.flatnonzero(np.diff(t) > _GAP * median) + 1
+    ends = np.flatnonzero(_gaps(t)) + 1
     broken = np.concatenate(
         ([0], ends, np.flatnonzero(~good), np.flatnonzero(~good) + 1, [len(t)])
     )
@@ -189,6 +187,17 @@ def _unbroken(name: str, t: FloatArray, samples: FloatArray) -> tuple[slice, tup
             f"the longest piece is {place}."
         )
     return rows, (f"gaps or NaN: the longest unbroken piece, {place}, was used",)
+
+
+def _gaps(t: FloatArray) -> BoolArray:
+    """Return which intervals lack a sample; one that came late is made up by its neighbours."""
+    dt = np.diff(t)
+    median = float(np.median(dt))
+    long = dt > 1.5 * median
+    two = dt[:-1] + dt[1:]
+    long[:-1] &= two > 2.5 * median
+    long[1:] &= two > 2.5 * median
+    return np.asarray(long)
 
 
 def _temperature(rec: Recording) -> float | None:

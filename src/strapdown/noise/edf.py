@@ -30,8 +30,9 @@ RANDOM_WALK: Final = -2
 _STEPS = 64  # steps per averaging time that stand for a continuum
 _REACH = 8  # lags kept, in spans of a difference; flicker noise forgets like 1/lag**2
 
-# Total deviation: edf = b * T / tau - c  [2]_.
+# Total deviation: edf = b * T / tau - c  [2]_. At few samples it is the Allan deviation.
 _TOTAL: Final = {WHITE: (1.5, 0.0), FLICKER: (1.17, 0.22), RANDOM_WALK: (0.93, 0.36)}
+_TOTAL_FROM: Final = 8
 
 
 def difference_order(kind: str) -> int:
@@ -49,17 +50,19 @@ def alpha_of_slope(slope: FloatArray) -> IntArray:
 
     Parameters
     ----------
-    slope : ndarray
-        Local slopes: -1 quantisation, -1/2 white, 0 flicker, +1/2 random walk. A ramp, slope
-        +1, counts as a random walk.
+    slope : ndarray, shape (k,)
+        Local slopes, averaging time increasing: -1 quantisation, -1/2 white, 0 flicker, +1/2
+        random walk. A ramp, slope +1, counts as a random walk.
 
     Returns
     -------
-    ndarray of int
+    ndarray of int, shape (k,)
+        Never increasing: of a sum of noises the one of smaller exponent rules later, and a
+        steeper slope at the longest times is chance.
     """
     limits = np.array([-0.75, -0.25, 0.25])
     alphas = np.array([QUANTISATION, WHITE, FLICKER, RANDOM_WALK])
-    return np.asarray(alphas[np.searchsorted(limits, slope)])
+    return np.asarray(np.minimum.accumulate(alphas[np.searchsorted(limits, slope)]))
 
 
 @lru_cache(maxsize=4096)
@@ -82,7 +85,7 @@ def edf(kind: str, n: int, m: int, alpha: int) -> float:
     float
         At least 1.
     """
-    if kind == "totdev" and alpha in _TOTAL:
+    if kind == "totdev" and alpha in _TOTAL and m >= _TOTAL_FROM:
         b, c = _TOTAL[alpha]
         return max(b * n / m - c, 1.0)
     order = difference_order(kind)

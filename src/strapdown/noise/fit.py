@@ -20,15 +20,18 @@ A curve that no sum of the terms describes gets a relative model error, just lar
 explain the residuals; it takes weight from the short times.
 """
 
+import math
 from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve, solve_triangular, toeplitz
+from scipy.linalg import toeplitz
 from scipy.optimize import brentq, nnls
-from scipy.stats import chi2, t
+from scipy.stats import chi2
+from scipy.stats import t as student
 
 from strapdown._types import FloatArray, IntArray
+from strapdown.kernels import toeplitz as _k
 from strapdown.noise.covariance import TERMS, Moments, difference_covariance
 
 _ROUNDS = 60  # of weights
@@ -148,10 +151,10 @@ class Fit:
         std, low, high = np.full(count, np.nan), np.zeros(count), np.full(count, np.inf)
         evidence = np.zeros(count)
         there = np.flatnonzero(theta > 0.0)
-        covariance = np.linalg.inv(problem.equations(theta)[0][np.ix_(there, there)])
+        covariance = np.linalg.inv(problem.information(theta)[np.ix_(there, there)])
         std[there] = np.sqrt(np.diag(covariance))
         for k in range(count):
-            evidence[k] = max(problem.profile(k, 0.0, theta) - best, 0.0)
+            evidence[k] = max(problem.profile(k, 0.0, theta)[0] - best, 0.0)
             if evidence[k] < EVIDENCE:
                 step = std[k] if theta[k] > 0.0 else problem.first_step(theta, k)
                 high[k] = _crossing(problem, k, theta, step, best + _ONE_SIDED)
@@ -192,16 +195,22 @@ class _Problem:
         self.sure = data.factors * _SURE_SHARE <= data.block * (data.steps.size + 1)
         if np.count_nonzero(self.sure) < 2:
             self.sure = self.short
-        self.steps = data.steps / np.sqrt(scale)
+        self.steps: FloatArray = data.steps / math.sqrt(scale)
         self.block = data.block
         self.factors = data.factors
-        lags = np.arange(data.steps.size, dtype=np.float64) * data.block
-        self.columns = [
-            difference_covariance(a, lags, data.block, data.block) / data.block**2
-            for a in range(len(TERMS))
-        ]
-        self.blocks = [toeplitz(column) for column in self.columns]
-        self.stacked = np.column_stack(self.blocks)
+        p = data.steps.size
+        lags = np.arange(p, dtype=np.float64) * data.block
+        self.columns = np.array(
+            [
+                difference_covariance(a, lags, data.block, data.block) / data.block**2
+                for a in range(len(TERMS))
+            ]
+        )
+        # Of a trace or quadratic form with a Toeplitz matrix each diagonal counts twice.
+        self.doubled = self.columns * np.where(np.arange(p) == 0, 1.0, 2.0)
+        ring = np.concatenate((self.columns, self.columns[:, :0:-1]), axis=1)
+        # Frequency zero is left out: white noise has no power there.
+        self.spectra = np.fft.rfft(ring, axis=1).real[:, 1:]
         self.frozen: tuple[FloatArray, FloatArray, float] | None = None
 
     def seek_ramp(self) -> tuple[float, float]:
@@ -212,7 +221,7 @@ class _Problem:
         self.ramp = True
         theta = self._iterate(theta, np.arange(len(TERMS)))
         gain = without - self.loss(theta)
-        mean, std = self._mean_step(self._block_factor(theta))
+        mean, std = self._mean_step(theta @ self.columns)
         self.frozen = None
         ramp = mean / self.block
         self.ramp = gain > _RAMP_EVIDENCE
@@ -241,39 +250,33 @@ class _Problem:
     def short_equations(self, theta: FloatArray) -> tuple[FloatArray, FloatArray, float]:
         """Return the normal equations of the short times, and the squared data."""
         s = self.short
-        L = np.linalg.cholesky(self.curve_covariance(theta)[np.ix_(s, s)])
-        W = solve_triangular(L, np.column_stack((self.A[s], self.y[s])), lower=True)
-        A, y = W[:, :-1], W[:, -1]
-        return np.asarray(A.T @ A), np.asarray(A.T @ y), float(y @ y)
+        A, y = self.A[s], self.y[s]
+        V = self.curve_covariance(theta)[np.ix_(s, s)]
+        W = np.linalg.solve(V, np.column_stack((A, y)))
+        M = A.T @ W[:, :-1]
+        return 0.5 * (M + M.T), A.T @ W[:, -1], float(y @ W[:, -1])
 
     def freeze(self, theta: FloatArray) -> None:
         """Keep the weights of the short times as they are at `theta`."""
         self.frozen = self.short_equations(theta)
 
-    def equations(self, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return information and right-hand side, weights as at `theta`."""
-        M, h, _ = self.frozen or self.short_equations(theta)
-        factor = self._block_factor(theta)
-        p = self.steps.size
-        solved = cho_solve(factor, self.stacked, check_finite=False)
-        e = cho_solve(factor, self._less_ramp(factor), check_finite=False)
-        h = h + 0.5 * np.array([e @ V @ e for V in self.blocks])
-        P = [solved[:, a * p : (a + 1) * p] for a in range(len(TERMS))]
-        F = np.empty_like(M)
-        for a in range(len(TERMS)):
-            for b in range(a, len(TERMS)):
-                F[a, b] = F[b, a] = 0.5 * np.einsum("ij,ji->", P[a], P[b])
-        return M + F, h
-
     def loss(self, theta: FloatArray) -> float:
         """Return -2 log L up to a constant; the short times must be frozen."""
         assert self.frozen is not None
         M, h, square = self.frozen
-        factor = self._block_factor(theta)
-        steps = self._less_ramp(factor)
-        fall = float(steps @ cho_solve(factor, steps))
-        fall += 2.0 * float(np.sum(np.log(np.diag(factor[0]))))
+        column = theta @ self.columns
+        steps = self._less_ramp(column)
+        x, log_det = _toeplitz_solve(column, steps)[:2]
+        fall = float(steps @ x) + log_det
         return fall + square - 2.0 * float(theta @ h) + float(theta @ M @ theta)
+
+    def information(self, theta: FloatArray) -> FloatArray:
+        """Return the Fisher information about all terms."""
+        M = self.short_equations(theta)[0] if self.frozen is None else self.frozen[0]
+        V = toeplitz(theta @ self.columns)
+        P = [np.linalg.solve(V, toeplitz(column)) for column in self.columns]
+        F = np.array([[0.5 * np.sum(a * b.T) for b in P] for a in P])
+        return np.asarray(M + F)
 
     def fit(self) -> FloatArray:
         """Return theta with all terms free."""
@@ -281,12 +284,8 @@ class _Problem:
         theta = nnls(relative, np.ones(self.y.size))[0]
         return self._iterate(theta, np.arange(len(TERMS)))
 
-    def profile(self, k: int, value: float, near: FloatArray) -> float:
-        """Return the loss with term `k` at `value` and the others at their best."""
-        return self.at(k, value, near)[0]
-
-    def at(self, k: int, value: float, near: FloatArray) -> tuple[float, FloatArray]:
-        """Return the loss and theta with term `k` at `value`, starting at theta `near`."""
+    def profile(self, k: int, value: float, near: FloatArray) -> tuple[float, FloatArray]:
+        """Return the least loss with term `k` at `value`, and theta there, sought from `near`."""
         others = np.flatnonzero(np.arange(len(TERMS)) != k)
         theta = near.copy()
         theta[k] = value
@@ -297,22 +296,23 @@ class _Problem:
 
     def first_step(self, theta: FloatArray, k: int) -> float:
         """Return a size at which a term that is absent would begin to matter."""
-        return float(1.0 / np.sqrt(self.equations(theta)[0][k, k]))
+        return float(1.0 / np.sqrt(self.information(theta)[k, k]))
 
     def _iterate(self, theta: FloatArray, free: IntArray) -> FloatArray:
+        """Return theta after scoring steps for the terms `free`, until the model stays."""
         held = theta.copy()
         held[free] = 0.0
         model = self.A @ theta
         for round_ in range(_ROUNDS):
-            M, h = self.equations(theta)
+            M, h = self._step_equations(theta)
             d = 1.0 / np.sqrt(np.diag(M))
             right = (h - M @ held)[free] * d[free]
             L = np.linalg.cholesky((M * np.outer(d, d))[np.ix_(free, free)])
             new = held.copy()
-            new[free] = nnls(L.T, solve_triangular(L, right, lower=True))[0] * d[free]
+            new[free] = nnls(L.T, np.linalg.solve(L, right))[0] * d[free]
             if not new.any():
                 return theta
-            if round_ > 20:  # a term may enter and leave in turn
+            if round_ > _ROUNDS // 3:  # a term may enter and leave in turn
                 new = 0.5 * (new + theta)
             theta, before = new, model
             model = self.A @ theta
@@ -320,24 +320,43 @@ class _Problem:
                 break
         return theta
 
-    def _mean_step(self, factor: tuple[FloatArray, bool]) -> tuple[float, float]:
-        """Return the mean of the steps and its deviation, at the weights of `factor`."""
-        weight = cho_solve(factor, np.ones(self.steps.size))
-        total = float(weight.sum())
-        return float(weight @ self.steps) / total, 1.0 / np.sqrt(total)
+    def _step_equations(self, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return matrix and right-hand side of a scoring step from `theta`.
 
-    def _less_ramp(self, factor: tuple[FloatArray, bool]) -> FloatArray:
+        The gradient is exact; the information of the steps is that of a series on a ring.
+        """
+        M, h, _ = self.frozen or self.short_equations(theta)
+        column = theta @ self.columns
+        x, _, a, error = _toeplitz_solve(column, self._less_ramp(column))
+        inverse, products = np.empty(x.size), np.empty(x.size)
+        _k.inverse_diagonals(a, error, inverse)
+        _k.lagged_products(x, products)
+        gradient = 0.5 * (self.doubled @ (products - inverse))
+        share = self.spectra / (theta @ self.spectra)
+        F = 0.5 * share @ share.T  # the ring is twice as long, and its two halves are alike
+        return M + F, h + F @ theta + gradient
+
+    def _mean_step(self, column: FloatArray) -> tuple[float, float]:
+        """Return the mean of the steps and its deviation, at the weights of `column`."""
+        weight = _toeplitz_solve(column, np.ones(self.steps.size))[0]
+        total = float(weight.sum())
+        return float(weight @ self.steps) / total, 1.0 / math.sqrt(total)
+
+    def _less_ramp(self, column: FloatArray) -> FloatArray:
         if not self.ramp:
             return self.steps
-        return np.asarray(self.steps - self._mean_step(factor)[0])
+        return self.steps - self._mean_step(column)[0]
 
-    def _block_factor(self, theta: FloatArray) -> tuple[FloatArray, bool]:
-        column = sum(t * c for t, c in zip(theta, self.columns, strict=True))
-        column[0] *= 1.0 + 1e-10
-        factor: tuple[FloatArray, bool] = cho_factor(
-            toeplitz(column), lower=True, check_finite=False
-        )
-        return factor
+
+def _toeplitz_solve(
+    column: FloatArray, y: FloatArray
+) -> tuple[FloatArray, float, FloatArray, float]:
+    """Return the solution, log det, and what the first column of the inverse is made of."""
+    row = column.copy()
+    row[0] *= 1.0 + 1e-10
+    a, x = np.empty(y.size), np.empty(y.size)
+    log_det, error = _k.solve(row, y, a, x)
+    return x, log_det, a, error
 
 
 def _with_model_error(problem: _Problem) -> FloatArray:
@@ -361,7 +380,7 @@ def _interval_fall(value: float, std: float) -> float:
     quantile in place of the normal one brings the coverage near its nominal value.
     """
     freedom = max(2.0 * (value / std) ** 2, 3.0)
-    quantile = float(t.ppf(0.5 + 0.5 * _CONFIDENCE, freedom))
+    quantile = float(student.ppf(0.5 + 0.5 * _CONFIDENCE, freedom))
     return quantile * quantile
 
 
@@ -371,7 +390,7 @@ def _crossing(problem: _Problem, k: int, theta: FloatArray, step: float, level: 
 
     def excess(value: float) -> float:
         nonlocal nearest
-        loss, nearest = problem.at(k, value, nearest)
+        loss, nearest = problem.profile(k, value, nearest)
         return loss - level
 
     near, far = theta[k], max(theta[k] + step, 0.0)

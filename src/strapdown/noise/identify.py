@@ -36,7 +36,8 @@ from strapdown.noise.fit import EVIDENCE, CurveFit, Data, Fit
 from strapdown.noise.stillness import require_signal
 
 LEAST_SAMPLES: Final = 256
-_BLOCKS: Final = 128  # block means for the long times
+_BLOCKS: Final = 192  # block means for the long times
+_LEAST_BLOCK: Final = 8  # samples; shorter times are left to the curve
 _WIDEST: Final = 0.5  # relative deviation of a coefficient above which it is no number
 _OCTAVES_TO_DROP: Final = 6  # of shortest times, where a low-pass filter bends the curve
 _LEAST_OCTAVES: Final = 6  # that stay
@@ -92,7 +93,7 @@ def identify(y: ArrayLike, fs: float, *, name: str = "y") -> Coefficients:
     require_signal(name, samples)
     factors = octaves(n)
     curve = allan_deviation(samples, fs, factors / fs)
-    block = max(n // _BLOCKS, 1)
+    block = max(n // _BLOCKS, _LEAST_BLOCK)
     x = integrated(samples)
     means = np.diff(x[::block]) / block
     steps = np.diff(means)

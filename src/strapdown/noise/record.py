@@ -190,7 +190,7 @@ class NoiseRecord:
             values[f"{name}_noise"] = _combined(white, axis)
             values[f"{name}_bias_noise"] = _combined(walk, axis)
             values[f"{name}_std"] = _combined([a.std for _, a in chosen], axis)
-        return FilterNoise(**values, notes=tuple(notes))  # type: ignore[arg-type]
+        return FilterNoise(**values, notes=tuple(notes))
 
 
 def _white(sensor: str, letter: str, c: Coefficient, notes: list[str]) -> float:

@@ -1,4 +1,4 @@
-"""Bad samples, gaps, strange starts: every attitude estimator stays finite and says what happened."""
+"""Bad samples, gaps, strange starts: every estimator stays finite and says what happened."""
 
 from dataclasses import replace
 

@@ -9,7 +9,7 @@ from truth import hand
 
 import strapdown as sd
 from strapdown.attitude import RobustEskf
-from strapdown.kernels import memory
+from strapdown.kernels import memory, robust_eskf_layout
 from strapdown.recording import Imu, Mag, Recording
 from strapdown.units import DEG, DPS, UT
 
@@ -146,7 +146,7 @@ def test_scale_and_misalignment_of_the_gyro_are_found():
     wrong = np.array([[0.99, 0.008, 0.0], [0.0, 1.01, -0.006], [0.009, 0.0, 0.99]])
     rec = log(t, gyr @ np.linalg.inv(wrong).T, acc, field)
     _, state = IDEAL.advance(IDEAL.init(), rec)
-    mg = IDEAL._kernel().MG
+    mg = robust_eskf_layout.MG
     off = np.abs(state.x[mg : mg + 9].reshape(3, 3) - (wrong - np.eye(3)))
     assert off.max() < 0.004  # of 0.005 to 0.01, and 0.005 is what was expected of it
     found = rms(hand.degrees_off(IDEAL.run(rec).q_nb, r_nb), t, 60.0)
@@ -169,11 +169,10 @@ def test_the_delay_of_the_magnetometer_is_found():
     _, gyr, acc, field = hand.sensors(t)
     late = hand.attitude(t - 0.02).inv().apply(hand.FIELD_N)
     flt = replace(IDEAL, mag_delay_std=0.03)
-    kernel = flt._kernel()
     _, state = flt.advance(flt.init(), log(t, gyr, acc, late))
-    assert abs(state.x[kernel.DELAY] - 0.02) < 0.003
+    assert abs(state.x[robust_eskf_layout.DELAY] - 0.02) < 0.003
     _, state = flt.advance(flt.init(), log(t, gyr, acc, field))
-    assert abs(state.x[kernel.DELAY]) < 0.003
+    assert abs(state.x[robust_eskf_layout.DELAY]) < 0.003
 
 
 def test_latency_turns_the_solution_forward():

@@ -5,9 +5,11 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from strapdown.kernels import memory as m
-from strapdown.kernels import robust_eskf as k
+from strapdown.kernels import robust_eskf
 from strapdown.kernels import robust_eskf_covariance as c
+from strapdown.kernels import robust_eskf_layout as k
 from strapdown.kernels import robust_eskf_smoother as s
+from strapdown.kernels.robust_eskf_update import heavy_tail
 
 N = c.N
 
@@ -120,13 +122,13 @@ def test_a_sample_turns_the_attitude_by_the_corrected_rate():
     flt = RobustEskf()
     (x, P), p, w = flt._memory(), flt._params(), np.zeros(k.W_SIZE)
     rest = (0.0, 0.0, 0.0, 1.0, 2.0, -9.5)
-    k.step(x, P, p, w, 0.0, *rest)
-    k.step(x, P, p, w, 0.02, *rest)
+    robust_eskf.step(x, P, p, w, 0.0, *rest)
+    robust_eskf.step(x, P, p, w, 0.02, *rest)
     mg, bias = 0.01 * rng.standard_normal((3, 3)), 0.1 * rng.standard_normal(3)
     x[k.MG : k.MG + 9], x[m.BG : m.BG + 3] = mg.ravel(), bias
     before = Rotation.from_quat(x[k.ATT : k.ATT + 4][[1, 2, 3, 0]])
     old, gyr, acc = x.copy(), rng.standard_normal(3), 9.0 * rng.standard_normal(3)
-    k.step(x, P, p, w, 0.04, *gyr, *acc)
+    robust_eskf.step(x, P, p, w, 0.04, *gyr, *acc)
     turned = 0.02 * (np.eye(3) + mg) @ (gyr - bias)
     after = before * Rotation.from_rotvec(turned)
     got = Rotation.from_quat(x[k.ATT : k.ATT + 4][[1, 2, 3, 0]])
@@ -259,9 +261,9 @@ def test_backward_pass_agrees_with_rauch_tung_and_striebel(reset):
 
 def test_heavy_tails_widen_outliers_only():
     """Weight of Student's t with nu degrees of freedom: (nu + 1) / (nu + ratio), at most one."""
-    assert k.heavy_tail(4.0, 0.0) == 1.0
-    assert k.heavy_tail(4.0, 1.0) == 1.0
-    assert k.heavy_tail(4.0, 6.0) == 2.0
+    assert heavy_tail(4.0, 0.0) == 1.0
+    assert heavy_tail(4.0, 1.0) == 1.0
+    assert heavy_tail(4.0, 6.0) == 2.0
 
 
 def test_memory_has_room_for_all_cells():

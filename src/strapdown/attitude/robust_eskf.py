@@ -164,20 +164,23 @@ class RobustEskf(AttitudeEstimator):
         return robust_eskf
 
     def _params(self) -> FloatArray:
-        k = self._kernel()
-        p = self._common(k.P_SIZE)
+        from strapdown.kernels import robust_eskf_layout as layout
+
+        p = self._common(layout.P_SIZE)
         p[_m.P_REALIGN] = 0.0  # over a gap the filter keeps what it knows
         for name in _POSITIVE + _NOT_NEGATIVE:
-            p[getattr(k, f"P_{name.upper()}")] = getattr(self, name)
+            p[getattr(layout, f"P_{name.upper()}")] = getattr(self, name)
         return p
 
     def _memory(self) -> tuple[FloatArray, FloatArray]:
-        k = self._kernel()
-        x = np.zeros(k.X_SIZE)
+        from strapdown.kernels.robust_eskf_covariance import N
+        from strapdown.kernels.robust_eskf_layout import X_SIZE
+
+        x = np.zeros(X_SIZE)
         x[: _m.HEAD], _ = AttitudeEstimator._memory(self)
         x[_m.STD_ATT : _m.STD_ATT + 3] = np.pi  # nothing is known
-        P = np.zeros((k.N, k.N))
-        k.init(x, P, self._params())
+        P = np.zeros((N, N))
+        self._kernel().init(x, P, self._params())
         return x, P
 
     def smooth(self, rec: Recording) -> Solution:
@@ -199,8 +202,8 @@ class RobustEskf(AttitudeEstimator):
             If the recording has no IMU.
         """
         from strapdown.kernels import robust_eskf_smoother as smoother
-        from strapdown.kernels.robust_eskf import RECORD_SIZE
         from strapdown.kernels.robust_eskf_covariance import INTERVAL, N
+        from strapdown.kernels.robust_eskf_layout import RECORD_SIZE
 
         imu = rec.need("imu")
         x, P = self._memory()

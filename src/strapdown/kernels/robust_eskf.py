@@ -6,35 +6,27 @@ one scalar at a time: the velocity, which stays bounded; at rest the rates, whic
 gyro's bias; and the direction of the horizontal magnetic field.
 """
 
-from math import atan2, cos, inf, isinf, sin, sqrt
+from math import cos, inf, isinf, sin, sqrt
 
 from strapdown.kernels import status as s
 from strapdown.kernels._jit import Mat, Vec, kernel
 from strapdown.kernels.memory import (
     BA,
     BG,
-    D_ACC,
-    D_MAG,
     DT,
-    HEAD,
     MAG,
-    P_COS_D,
     P_GYR_RANGE,
-    P_HEAD,
-    P_SIN_D,
     SKIP,
     START,
     STD_ATT,
     STD_BA,
     STD_BG,
-    W_HEAD,
     WIDEN,
     Q,
     T,
     V,
     begin,
     load,
-    note_sigma,
     post,
     set_status,
     store,
@@ -46,133 +38,59 @@ from strapdown.kernels.robust_eskf_covariance import (
     EBA,
     EBG,
     EMG,
-    INTERVAL,
     LAG,
     PHI,
     TAU,
     THETA,
     VEL,
     N,
-    enter,
     forget,
-    propagate,
 )
+from strapdown.kernels.robust_eskf_layout import (
+    ACC_HELD,
+    ACC_MEAN,
+    ATT,
+    DRIFT,
+    EXTRA,
+    FIELD,
+    FLAGS,
+    GYR_MEAN,
+    HAS_HELD,
+    LARGEST,
+    LAST_GYR,
+    MG,
+    OPEN,
+    P_ACC_BIAS_STD,
+    P_FIELD_STD,
+    P_GRAVITY,
+    P_GYR_BIAS_STD,
+    P_GYR_SCALE_STD,
+    P_INTERVAL,
+    P_LATENCY,
+    P_MAG_DELAY_STD,
+    P_RATE_WALK,
+    P_REST_ACC,
+    P_REST_GYR,
+    P_TIMING_STD,
+    P_VELOCITY_STD,
+    QUIET,
+    R_RESET,
+    R_RESET_T,
+    R_TURN,
+    REPEATED,
+    STARTED,
+    USUAL,
+)
+from strapdown.kernels.robust_eskf_layout import W_SIZE as W_SIZE
+from strapdown.kernels.robust_eskf_update import LOW_PASS, clear, close_interval
 
-# --- p -----------------------------------------------------------------------------------
-P_GYR_NOISE = P_HEAD
-P_GYR_RATE_NOISE = P_HEAD + 1
-P_GYR_BIAS_WALK = P_HEAD + 2
-P_GYR_BIAS_STD = P_HEAD + 3
-P_GYR_SCALE_STD = P_HEAD + 4
-P_ACC_NOISE = P_HEAD + 5
-P_ACC_BIAS_STD = P_HEAD + 6
-P_VELOCITY_STD = P_HEAD + 7
-P_VELOCITY_TIME = P_HEAD + 8
-P_MAG_STD = P_HEAD + 9
-P_MAG_TIME = P_HEAD + 10
-P_MAG_WALK = P_HEAD + 11
-P_MAG_DELAY_STD = P_HEAD + 12
-P_TAILS = P_HEAD + 13
-P_REST_GYR = P_HEAD + 14
-P_REST_ACC = P_HEAD + 15
-P_REST_TIME = P_HEAD + 16
-P_RATE_WALK = P_HEAD + 17
-P_INTERVAL = P_HEAD + 18
-P_LATENCY = P_HEAD + 19
-P_TIMING_STD = P_HEAD + 20
-P_FIELD_STD = P_HEAD + 21
-P_GRAVITY = P_HEAD + 22
-P_SIZE = P_HEAD + 23
-
-# --- x -----------------------------------------------------------------------------------
-ATT = HEAD  # q_nb before the latency is added: 4
-MG = HEAD + 4  # scale and misalignment of the gyro: 9
-DELAY = HEAD + 13  # of the magnetometer [s]
-OPEN = HEAD + 14  # sums of the open interval
-FIELD = OPEN + INTERVAL  # field in n (3), turning rate of the field (2), count
-EXTRA = FIELD + 6  # variances that the interval adds besides the noise: angle, velocity
-SINCE_MAG = EXTRA + 2  # [s]
-USUAL = SINCE_MAG + 1  # usual field: horizontal, down, variance of both
-GYR_MEAN = USUAL + 3  # low-passed rate and specific force
-ACC_MEAN = GYR_MEAN + 3
-QUIET = ACC_MEAN + 3  # how long both have been near their mean [s]
-DRIFT = QUIET + 1  # low-passed velocity over its deviation: 3
-FLAGS = DRIFT + 3  # status bits of the last interval
-ACC_HELD = FLAGS + 1  # last specific force, for sensors slower than the gyro: 3
-HAS_HELD = ACC_HELD + 3
-ASTRAY = HAS_HELD + 1  # low-passed heading innovation in a field of the usual strength [rad]
-LARGEST = ASTRAY + 1  # rate of largest magnitude so far, one axis [rad/s]
-REPEATED = LARGEST + 1  # how often the largest component has repeated to the last bit
-LAST_GYR = REPEATED + 1  # last sample: 3
-STARTED = LAST_GYR + 3
-X_SIZE = STARTED + 1
-
-# --- w: scratch, and the record of a closed interval that the smoother reads ---------------------
-ERROR = W_HEAD  # error state of the open update
-SCRATCH = ERROR + N
-RECORD = SCRATCH + 12 * N
-R_CLOSED = RECORD  # 1 when this sample closed an interval
-R_RESET = RECORD + 1  # 1 if attitude and velocity were forgotten in it, 2 if heading was
-R_RESET_T = RECORD + 2  # and when
-R_TURN = RECORD + 3  # turn about down at that reset
-R_COUNT = RECORD + 4  # measurements
-R_STEP = RECORD + 5  # corrections of attitude and gyro bias
-R_SUMS = R_STEP + 6
-R_ROWS = R_SUMS + INTERVAL  # rows of attitude and gyro bias of P after the updates
-R_MEASURED = R_ROWS + 6 * N  # each: element, h_lag, innovation, its variance, g
-MEASURED = N + 4
-W_SIZE = R_MEASURED + 7 * MEASURED
-RECORD_SIZE = W_SIZE - RECORD
-
-LOW_PASS = 0.5  # time constant of the means that show rest [s]
 MIN_RATE = 0.035  # a mean rate below 2 deg/s may be rest [rad/s]
-REST_SPEED = 0.01  # speed at rest [m/s]
-REST_RATE = 3.5e-4  # mean rate at rest, bias apart [rad/s]
 TILT_STD = 0.1  # of an attitude levelled from one sample [rad]
 HEADING_STD = 0.3  # of a heading from one sample of the field [rad]
 LOST = 10.0  # deviations of the mean velocity that no motion explains
-LOST_HEADING = 15.0  # deviations of the field to the side, alone, that no disturbance explains
-LOST_TIME = 5.0  # on the mean of so long [s]
 CLIPPED_RATE = 0.5  # the largest rate so far, if above this [rad/s] and ...
 CLIPPED_COUNT = 3.0  # ... repeated so often to the last bit, is the end of the range
 CLIPPED_TIME = 0.25  # how long an unseen rate lasts [s]
-DISTURBED = 10.0  # deviations of the field that the flag tells
-
-
-@kernel
-def heavy_tail(tails: float, ratio: float) -> float:
-    """Factor on a variance so that a normal update follows Student's t.
-
-    `ratio` is the innovation squared over its variance, `tails` the degrees of freedom.
-    """
-    return max(1.0, (tails + ratio) / (tails + 1.0))
-
-
-@kernel
-def _measure(P: Mat, w: Vec, i: int, h_lag: float, z: float, r: float) -> None:
-    """Enter a scalar into covariance and error state, and record it for the smoother."""
-    m = R_MEASURED + int(w[R_COUNT]) * MEASURED
-    innovation = z - w[ERROR + i] - h_lag * w[ERROR + LAG]
-    variance = enter(P, i, h_lag, r, w, m + 4)
-    k = innovation / sqrt(variance)
-    for j in range(N):
-        w[ERROR + j] += k * w[m + 4 + j]
-    w[m] = float(i)
-    w[m + 1] = h_lag
-    w[m + 2] = innovation
-    w[m + 3] = variance
-    w[R_COUNT] += 1.0
-
-
-@kernel
-def _clear(x: Vec) -> None:
-    """Open a new interval."""
-    for i in range(INTERVAL):
-        x[OPEN + i] = 0.0
-    for i in range(6):
-        x[FIELD + i] = 0.0
-    x[EXTRA] = 0.0
-    x[EXTRA + 1] = 0.0
 
 
 @kernel
@@ -185,7 +103,7 @@ def _forget_motion(x: Vec, P: Mat, p: Vec, w: Vec, ax: float, ay: float, az: flo
         x[V + i] = 0.0
         x[DRIFT + i] = 0.0
     x[QUIET] = 0.0
-    _clear(x)
+    clear(x)
     w[R_RESET] = 1.0
     w[R_RESET_T] = x[T]
 
@@ -208,159 +126,6 @@ def _level(
     else:
         _forget_motion(x, P, p, w, 0.0, 0.0, 0.0)
     P[PHI + 2, PHI + 2] = heading
-
-
-@kernel
-def _velocity(x: Vec, P: Mat, p: Vec, w: Vec, rest: bool) -> None:
-    """Velocity is zero: at rest exactly, else within its bound, with heavy tails."""
-    tau = x[OPEN + TAU]
-    bound = p[P_VELOCITY_STD] * p[P_VELOCITY_STD]
-    fade = min(1.0, 0.5 * tau)
-    for i in range(3):
-        v = x[V + i]
-        expected = P[VEL + i, VEL + i] + bound
-        x[DRIFT + i] += fade * (v / sqrt(expected) - x[DRIFT + i])
-        r = REST_SPEED * REST_SPEED
-        if not rest:  # one look per interval at something that changes over `velocity_time`
-            r = bound * max(1.0, 2.0 * p[P_VELOCITY_TIME] / tau)
-            r *= heavy_tail(p[P_TAILS], v * v / expected)
-        note_sigma(w, D_ACC, i, -v, P[VEL + i, VEL + i] + r)
-        _measure(P, w, VEL + i, 0.0, -v, r)
-    w[D_ACC + 6] = s.ACCEPTED
-
-
-@kernel
-def _rest(x: Vec, P: Mat, p: Vec, w: Vec) -> None:
-    """At rest the mean rate is the gyro's bias; heavy tails, lest slow turning pass for it."""
-    r0 = REST_RATE * REST_RATE
-    for i in range(3):
-        d = x[GYR_MEAN + i] - x[BG + i]
-        r = r0 * max(1.0, 2.0 * LOW_PASS / x[OPEN + TAU])
-        r *= heavy_tail(p[P_TAILS], d * d / (P[EBG + i, EBG + i] + r0))
-        _measure(P, w, EBG + i, 0.0, d, r)
-
-
-@kernel
-def _heading(x: Vec, P: Mat, p: Vec, w: Vec) -> int:
-    """Heading from the mean horizontal field of the interval; returns status bits.
-
-    How far the field is off its usual horizontal and vertical strength tells how large the
-    disturbance is, and so how much the third component, its direction, may be off.
-    """
-    k = 1.0 / x[FIELD + 5]
-    turn_n, turn_e = k * x[FIELD + 3], k * x[FIELD + 4]
-    mn = k * x[FIELD] - x[DELAY] * turn_n
-    me = k * x[FIELD + 1] - x[DELAY] * turn_e
-    md = k * x[FIELD + 2]
-    h2 = mn * mn + me * me
-    if not h2 > 0.0:
-        return s.MAG_INVALID
-    if x[USUAL + 2] == 0.0:  # the first field is the usual one
-        x[USUAL] = sqrt(h2)
-        x[USUAL + 1] = md
-        x[USUAL + 2] = 400.0 * p[P_MAG_STD] * p[P_MAG_STD]
-    dh = sqrt(h2) - x[USUAL]
-    dd = md - x[USUAL + 1]
-    off2 = dh * dh + dd * dd
-    usual = p[P_MAG_STD] * p[P_MAG_STD]
-    tails = p[P_TAILS]
-    variance = (tails * usual + off2) / (tails + 2.0)
-    c, d = p[P_COS_D], p[P_SIN_D]
-    z = atan2(d * mn - c * me, c * mn + d * me)
-    r = variance / (x[USUAL] * x[USUAL])
-    d = z - w[ERROR + PHI + 2]
-    r *= heavy_tail(tails + 2.0, d * d / (P[PHI + 2, PHI + 2] + r))
-    # a disturbance lasts: looks that are closer than it tell the same
-    lasting = max(1.0, 2.0 * p[P_MAG_TIME] / x[SINCE_MAG])
-    note_sigma(w, D_MAG, 0, dh, variance)
-    note_sigma(w, D_MAG, 1, d * x[USUAL], (P[PHI + 2, PHI + 2] + r) * x[USUAL] * x[USUAL])
-    note_sigma(w, D_MAG, 2, dd, variance)
-    w[D_MAG + 6] = s.ACCEPTED
-    if off2 < DISTURBED * DISTURBED * usual:
-        x[ASTRAY] += min(1.0, x[SINCE_MAG] / LOST_TIME) * (z - x[ASTRAY])
-    if abs(x[ASTRAY]) * x[USUAL] > LOST_HEADING * p[P_MAG_STD]:  # the gyro has missed a turn
-        P[PHI + 2, PHI + 2] += x[ASTRAY] * x[ASTRAY]
-        x[ASTRAY] = 0.0
-    # with more delay than assumed the field stood back by its turning
-    h_lag = (turn_n * me - turn_e * mn) / h2
-    _measure(P, w, PHI + 2, h_lag, z, r * lasting)
-    x[USUAL + 2] += p[P_MAG_WALK] * p[P_MAG_WALK] * x[SINCE_MAG]
-    gain = x[USUAL + 2] / (x[USUAL + 2] + variance * lasting)
-    x[USUAL] += gain * dh
-    x[USUAL + 1] += gain * dd
-    x[USUAL + 2] *= 1.0 - gain
-    x[SINCE_MAG] = 0.0
-    if off2 > DISTURBED * DISTURBED * usual:
-        w[D_MAG + 6] = s.REJECTED_DISTURBED
-        return s.MAG_DISTURBED
-    return 0
-
-
-@kernel
-def _add_noise(x: Vec, P: Mat, p: Vec) -> None:
-    """Process noise of the interval."""
-    tau = x[OPEN + TAU]
-    tx, ty, tz = x[OPEN + THETA], x[OPEN + THETA + 1], x[OPEN + THETA + 2]
-    rate2 = (tx * tx + ty * ty + tz * tz) / (tau * tau)
-    phi = p[P_GYR_NOISE] * p[P_GYR_NOISE] + p[P_GYR_RATE_NOISE] * p[P_GYR_RATE_NOISE] * rate2
-    vel = p[P_ACC_NOISE] * p[P_ACC_NOISE]
-    bias = p[P_GYR_BIAS_WALK] * p[P_GYR_BIAS_WALK]
-    # constants may change by their own size within hours: their variance never reaches zero
-    acc_bias = 1e-4 * p[P_ACC_BIAS_STD] * p[P_ACC_BIAS_STD]
-    scale = 1e-6 * p[P_GYR_SCALE_STD] * p[P_GYR_SCALE_STD]
-    delay = 1e-6 * p[P_MAG_DELAY_STD] * p[P_MAG_DELAY_STD]
-    for i in range(3):
-        P[PHI + i, PHI + i] += phi * tau + x[EXTRA]
-        P[VEL + i, VEL + i] += vel * tau + x[EXTRA + 1]
-        P[EBG + i, EBG + i] += bias * tau
-        P[EBA + i, EBA + i] += acc_bias * tau
-    for i in range(9):
-        P[EMG + i, EMG + i] += scale * tau
-    P[LAG, LAG] += delay * tau
-
-
-@kernel
-def _close(x: Vec, P: Mat, p: Vec, w: Vec) -> None:
-    """Propagate over the interval, enter the measurements, correct the estimate."""
-    tau = x[OPEN + TAU]
-    for i in range(INTERVAL):
-        w[R_SUMS + i] = x[OPEN + i]
-    propagate(P, x, OPEN, w, SCRATCH)
-    _add_noise(x, P, p)
-    for i in range(N):
-        w[ERROR + i] = 0.0
-    w[R_COUNT] = 0.0
-    w[R_CLOSED] = 1.0
-    bits = 0
-    rest = x[QUIET] >= p[P_REST_TIME]
-    _velocity(x, P, p, w, rest)
-    if rest:
-        bits |= s.REST
-        _rest(x, P, p, w)
-    x[SINCE_MAG] += tau
-    if x[FIELD + 5] > 0.0:
-        bits |= _heading(x, P, p, w)
-    x[FLAGS] = float(bits)
-
-    c0, c1, c2, c3 = exp(w[ERROR], w[ERROR + 1], w[ERROR + 2])
-    q0, q1, q2, q3 = mul(c0, c1, c2, c3, x[ATT], x[ATT + 1], x[ATT + 2], x[ATT + 3])
-    x[ATT], x[ATT + 1], x[ATT + 2], x[ATT + 3] = normalize(q0, q1, q2, q3)
-    for i in range(3):
-        x[V + i] += w[ERROR + VEL + i]
-        x[BG + i] += w[ERROR + EBG + i]
-        x[BA + i] += w[ERROR + EBA + i]
-        x[STD_BG + i] = sqrt(P[EBG + i, EBG + i])
-        x[STD_BA + i] = sqrt(P[EBA + i, EBA + i])
-        w[R_STEP + i] = w[ERROR + PHI + i]
-        w[R_STEP + 3 + i] = w[ERROR + EBG + i]
-    for i in range(9):
-        x[MG + i] += w[ERROR + EMG + i]
-    x[DELAY] += w[ERROR + LAG]
-    for j in range(N):
-        for i in range(3):
-            w[R_ROWS + i * N + j] = P[PHI + i, j]
-            w[R_ROWS + (3 + i) * N + j] = P[EBG + i, j]
-    _clear(x)
 
 
 @kernel
@@ -408,7 +173,7 @@ def _begin_interval(
             sin(c3) * x[V] + cos(c3) * x[V + 1],
         )
         forget(P, PHI + 2, HEADING_STD * HEADING_STD)
-        _clear(x)
+        clear(x)
         w[R_RESET] = max(2.0, w[R_RESET])
         w[R_RESET_T] = x[T]
         w[R_TURN] += c3
@@ -589,7 +354,7 @@ def step(
 
     _note_rest(x, p, t - before, gx, gy, gz, has_acc, ax, ay, az)
     if x[OPEN + TAU] >= p[P_INTERVAL]:
-        _close(x, P, p, w)
+        close_interval(x, P, p, w)
         k = x[DRIFT] * x[DRIFT] + x[DRIFT + 1] * x[DRIFT + 1] + x[DRIFT + 2] * x[DRIFT + 2]
         if k > LOST * LOST and has_acc:
             _level(x, P, p, w, True, ax, ay, az)

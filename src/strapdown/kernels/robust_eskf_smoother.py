@@ -24,7 +24,17 @@ from strapdown.kernels import status as s
 from strapdown.kernels._jit import IntVec, Mat, Vec, kernel
 from strapdown.kernels.memory import BG, STATUS, STD_ATT, STD_BG, Q, load, store
 from strapdown.kernels.quat import exp, mul, normalize, rotate
-from strapdown.kernels.robust_eskf import (
+from strapdown.kernels.robust_eskf import step
+from strapdown.kernels.robust_eskf_covariance import (
+    EBG,
+    INTERVAL,
+    LAG,
+    PHI,
+    VEL,
+    N,
+    transpose_on_row,
+)
+from strapdown.kernels.robust_eskf_layout import (
     MEASURED,
     P_TIMING_STD,
     R_CLOSED,
@@ -38,16 +48,6 @@ from strapdown.kernels.robust_eskf import (
     R_TURN,
     RECORD,
     RECORD_SIZE,
-    step,
-)
-from strapdown.kernels.robust_eskf_covariance import (
-    EBG,
-    INTERVAL,
-    LAG,
-    PHI,
-    VEL,
-    N,
-    transpose_on_row,
 )
 
 # Columns of the smoothed corrections, six of attitude and gyro bias each: at the end of an

@@ -6,7 +6,7 @@ from scipy.spatial.transform import Rotation
 from truth import hand
 from truth.kernel_step import NO_MAG, feed, quat, rotation, scalar_first, start
 
-from strapdown.attitude import GyroIntegration
+from strapdown.attitude import GyroIntegration, Madgwick, Mahony, Mekf
 from strapdown.kernels import memory as m
 from strapdown.kernels import status as s
 
@@ -114,6 +114,61 @@ def test_no_turning_is_lost_at_the_first_field_sample():
     now = TURNED * Rotation.from_rotvec(rate * dt)
     feed(flt, x, P, dt, rate, np.full(3, np.inf), now.inv().apply(hand.FIELD_N))
     assert (rotation(quat(x)) * now.inv()).magnitude() < 1e-13
+
+
+@pytest.mark.parametrize("flt", [Madgwick(beta=0.5), Mahony(kp=2.0), Mekf(acc_noise=0.1)])
+def test_first_field_sample_aligns_and_propagates_but_corrects_nothing(flt):
+    """The accelerometer says something else at that sample, and the bias is that of the state."""
+    state = flt.init()
+    x, P = state.x, state.P
+    rate, dt, offset = np.array([4.0, -6.0, 8.0]), 0.1, np.array([0.5, -0.2, 0.1])
+    feed(flt, x, P, 0.0, rate, TURNED.inv().apply(DOWN_ACC))
+    x[m.BG : m.BG + 3] = offset
+    now = TURNED * Rotation.from_rotvec((rate - offset) * dt)
+    feed(flt, x, P, dt, rate, [3.0, 2.0, -9.0], now.inv().apply(hand.FIELD_N))
+    assert (rotation(quat(x)) * now.inv()).magnitude() < 1e-13
+    assert np.array_equal(x[m.BG : m.BG + 3], offset)
+    assert not P.size or x[m.STD_ATT] == pytest.approx(flt.std_tilt, rel=1e-12)
+
+
+@pytest.mark.parametrize("flt", [Madgwick(), Mahony(), Mekf()])
+def test_skipped_samples_change_nothing_but_the_status(flt):
+    x, P = start(flt, scalar_first(TURNED))
+    before, P_before = x.copy(), P.copy()
+    feed(flt, x, P, 0.1, [0.0, np.nan, 0.0], DOWN_ACC)
+    assert int(x[m.STATUS]) == s.GYR_INVALID
+    x[m.STATUS] = before[m.STATUS]
+    assert np.array_equal(x, before)
+    assert np.array_equal(P, P_before)
+
+
+def test_cells_of_the_memory_lie_side_by_side():
+    cells = [
+        (m.T, 1), (m.STATUS, 1), (m.Q, 4), (m.BG, 3), (m.STD_ATT, 3), (m.STD_BG, 3), (m.LLA, 3),
+        (m.V, 3), (m.STD_POS, 3), (m.STD_V, 3), (m.BA, 3), (m.STD_BA, 3), (m.Q_VB, 4),
+        (m.OMEGA, 3), (m.DT, 1), (m.ALIGNED, 1), (m.MAG, 4), (m.STAR, 5), (m.GNSS, 15),
+        (m.BARO, 2), (m.SPEED, 2), (m.AIRSPEED, 2), (m.HEAD, 0),
+    ]  # fmt: skip
+    end = 0
+    for first, count in cells:
+        assert first == end
+        end += count
+    common = [
+        m.P_MAX_GAP, m.P_USE_MAG, m.P_COS_D, m.P_SIN_D, m.P_GYR_RANGE, m.P_ACC_RANGE,
+        m.P_REALIGN, m.P_HEAD,
+    ]  # fmt: skip
+    assert common == list(range(len(common)))
+    assert [m.D_ACC, m.D_MAG, m.W_HEAD] == [0, 7, 14]
+
+
+@pytest.mark.parametrize("flt", [Madgwick(), Mahony(), Mekf()])
+def test_parameters_of_a_filter_lie_side_by_side_after_the_common_ones(flt):
+    kernel = flt._kernel()
+    own = {v for n, v in vars(kernel).items() if n.startswith("P_") and v >= m.P_HEAD}
+    names = {"P_HEAD", "P_SIZE"} & set(vars(kernel))
+    assert len(names) == 2
+    assert own == set(range(m.P_HEAD, kernel.P_SIZE + 1))
+    assert len(flt._params()) == kernel.P_SIZE
 
 
 def test_vertical_field_sets_no_heading():

@@ -10,7 +10,20 @@ from typing import Annotated
 import typer
 
 from strapdown import __version__
-from strapdown.cli import _console, _errors, calibrate, compare, convert, demo, filters, info, run, simulate
+from strapdown.cli import (
+    _console,
+    _errors,
+    calibrate,
+    compare,
+    convert,
+    demo,
+    doctor,
+    filters,
+    info,
+    outages,
+    run,
+    simulate,
+)
 
 app = typer.Typer(
     name="strapdown",
@@ -21,8 +34,10 @@ app = typer.Typer(
 app.command("run")(run.run)
 app.command("demo")(demo.demo)
 app.command("info")(info.info)
+app.command("doctor")(doctor.doctor)
 app.command("convert")(convert.convert)
 app.command("compare")(compare.compare)
+app.command("outages")(outages.outages)
 app.command("filters")(filters.filters)
 app.add_typer(calibrate.app, name="calibrate")
 app.command("simulate")(simulate.simulate)

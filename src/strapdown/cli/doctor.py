@@ -1,10 +1,13 @@
 """``strapdown doctor``: what a log really holds."""
 
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated
 
-from strapdown.cli import _console, _options
+import typer
+
+from strapdown.cli import _console, _errors, _options
 from strapdown.errors import FormatError, InputError
+from strapdown.units import DEG
 
 if TYPE_CHECKING:
     from strapdown.doctor import Finding
@@ -17,6 +20,14 @@ _RAW_OPTIONS = ("format", "columns", "units", "rate", "delimiter")
 @_options.reads_log
 def doctor(
     source: _options.Source,
+    up: Annotated[
+        str | None,
+        typer.Option("--up", metavar="AXIS", help="The box's axis that is up at the start: -z."),
+    ] = None,
+    place: Annotated[
+        str | None,
+        typer.Option("--place", metavar="LAT,LON", help="Where it was, in degrees: 52.5,13.4."),
+    ] = None,
     json: _options.Json = False,
     debug: _options.Debug = False,
 ) -> None:
@@ -26,11 +37,24 @@ def doctor(
     """
     from strapdown.doctor import examine
 
-    findings = examine(_opened(source))
+    where = None if place is None else _place(place)
+    with _errors.given("--up"):
+        findings = examine(_opened(source), up=up, place=where)
     if json:
         _console.print_json({"log": str(source.main), "findings": [asdict(f) for f in findings]})
     else:
         _print(str(source.main), findings)
+
+
+def _place(text: str) -> tuple[float, float]:
+    """Return latitude and longitude [rad] of ``52.5,13.4``."""
+    try:
+        latitude, longitude = (float(part) for part in text.split(","))
+    except ValueError:
+        raise InputError(f"--place must be LAT,LON in degrees, got {text!r}.") from None
+    if not (abs(latitude) <= 90.0 and abs(longitude) <= 360.0):
+        raise InputError(f"--place must be on the Earth, got {text!r}.")
+    return latitude * DEG, longitude * DEG
 
 
 def _opened(source: _options.Source) -> "Recording | RawLog":
@@ -82,10 +106,3 @@ def brief(rec: "Recording") -> list[str]:
         return []
     more = f" (and {len(alarms) - 1} more)" if len(alarms) > 1 else ""
     return [f"{alarms[0].sentence} See `strapdown doctor`{more}."]
-
-
-def facts(rec: "Recording") -> list[dict[str, Any]]:
-    """Return the alarms of a quick look as JSON has them."""
-    from strapdown.doctor import examine
-
-    return [asdict(f) for f in examine(rec, quick=True) if f.is_alarm]

@@ -17,8 +17,8 @@ from strapdown.units import DPS
 
 # What is left unexplained where a hypothesis is believed, relative to the field.
 _EXPLAINED: Final = 0.15
-# Asked first: the unit as stated, and degrees for radians either way.
-_USUAL_SCALES: Final = [1.0, DPS, 1.0 / DPS]
+# Asked first: the unit as stated, a half and the double of it, and degrees for radians.
+_USUAL_SCALES: Final = [1.0, 0.5, 2.0, DPS, 1.0 / DPS]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -71,7 +71,8 @@ def relations(log: Log, grid: Grid, *, quick: bool = False) -> list[Relation]:
         if sensor not in grid.fields:
             continue
         relation = _relation(log, grid, gyr, sensor, [1.0] if quick else _USUAL_SCALES)
-        if not quick and (relation is None or not relation.decided):
+        settled = relation is not None and relation.decided and relation.scale == 1.0
+        if not quick and not settled:
             scales = scales_of("gyr", log.sensors["gyr"].unit)
             relation = _relation(log, grid, gyr, sensor, scales) or relation
         if relation is not None:

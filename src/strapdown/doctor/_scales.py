@@ -24,6 +24,7 @@ _GRAVITY_WITHIN: Final = (0.80, 1.25)  # of 9.8 m/s^2: bias, scale and motion of
 EARTH_FIELD_T: Final = (22.0 * UT, 67.0 * UT)
 _FIELD_TYPICAL_T: Final = 45.0 * UT
 _FIELD_POSSIBLE_T: Final = (12.0 * UT, 130.0 * UT)  # with magnets and steel nearby
+_RANGES: Final = (0.5, 2.0, 0.25, 4.0)  # of counts scaled with another range
 _FASTEST_GYR: Final = 36.0  # [rad/s] 2000 deg/s
 
 
@@ -61,8 +62,8 @@ def mistakes(sensor: str, stated: Unit | None) -> list[Mistake]:
 
 
 def scales_of(sensor: str, stated: Unit | None) -> list[float]:
-    """Return one and the factors of the mistakes, each once."""
-    found = [1.0]
+    """Return one, the factors of wrong full-scale ranges and of the mistakes, each once."""
+    found = [1.0, *_RANGES]
     for mistake in mistakes(sensor, stated):
         if all(abs(math.log(mistake.factor / k)) > 0.03 for k in found):
             found.append(mistake.factor)
@@ -77,6 +78,15 @@ def mistake_finding(
     if stated is None:
         near = near[:2]
     names = " or ".join(f"{m.true.symbol} taken for {m.taken.symbol}" for m in near)
+    if factor in _RANGES:
+        return Finding(
+            check="units",
+            severity=Severity.ERROR,
+            sentence=f"The {WORD[sensor]}'s values must be {factor:g} times as large: {why}.",
+            confidence=confidence,
+            advice="Check the full-scale range that its counts were scaled with.",
+            stream=sensor,
+        )
     inverse = 1.0 / factor
     size = f"{inverse:.4g} times too large" if inverse > 1.0 else f"{factor:.4g} times too small"
     offers = list(dict.fromkeys(f"--units {sensor}={m.true.name}" for m in near))

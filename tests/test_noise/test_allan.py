@@ -5,11 +5,11 @@ import tracemalloc
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from truth.noise import at_rest
 
 from strapdown.errors import InputError
 from strapdown.noise import KINDS, allan_deviation, default_taus
 from strapdown.noise.allan import integrated, local_slope, longest_factor
-from truth.noise import at_rest
 
 # Frequency values of NBS Monograph 140, annex 8.E, and the deviations that W. J. Riley prints for
 # them, "The calculation of time domain frequency stability", table I, and NIST SP 1065, 12.4.
@@ -113,7 +113,9 @@ def test_interval_holds_the_truth_as_often_as_it_says(kind, noise):
     n, runs = 512, 400
     taus = [1.0, 8.0, 32.0, 100.0]
     curves = [
-        allan_deviation(at_rest(np.random.default_rng([31, s]), n, 1.0, **noise), 1.0, taus, kind=kind)
+        allan_deviation(
+            at_rest(np.random.default_rng([31, s]), n, 1.0, **noise), 1.0, taus, kind=kind
+        )
         for s in range(runs)
     ]
     variance = np.array([c.dev for c in curves]) ** 2
@@ -127,7 +129,9 @@ def test_interval_holds_the_truth_as_often_as_it_says(kind, noise):
 
 def test_edf_of_white_noise_side_by_side_is_two_thirds_of_the_differences():
     # var of a mean square of first differences of white noise: lag-one correlation -1/2.
-    curve = allan_deviation(np.random.default_rng(2).standard_normal(30_000), 1.0, [1.0], kind="adev")
+    curve = allan_deviation(
+        np.random.default_rng(2).standard_normal(30_000), 1.0, [1.0], kind="adev"
+    )
     assert curve.edf[0] == pytest.approx(2.0 / 3.0 * 30_000, rel=1e-3)
 
 
@@ -172,7 +176,9 @@ def test_large_mean_costs_no_digits():
     y = np.random.default_rng(0).standard_normal(5000)
     with_mean = np.round(y * 2**20) / 2**20  # exact with and without the mean
     assert_allclose(
-        allan_deviation(with_mean + 2.0**16, 1.0).dev, allan_deviation(with_mean, 1.0).dev, rtol=1e-9
+        allan_deviation(with_mean + 2.0**16, 1.0).dev,
+        allan_deviation(with_mean, 1.0).dev,
+        rtol=1e-9,
     )
 
 

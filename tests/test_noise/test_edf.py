@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from truth.noise import at_rest
 
 from strapdown.noise.allan import allan_deviation
 from strapdown.noise.covariance import TERMS, difference_covariance, moments
 from strapdown.noise.edf import alpha_of_slope, confidence_interval, edf
-from truth.noise import at_rest
 
 LONG = dict(rtol=0.01)  # of Greenhall's truncations
 

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 from scipy.signal import butter, lfilter
+from truth.noise import at_rest, power_law
 
 from strapdown.errors import InputError
 from strapdown.noise import Status, allan_deviation, identify, read_off
 from strapdown.noise.coefficients import Coefficients, coefficient_unit, line
 from strapdown.noise.identify import octaves
 from strapdown.units import DPS
-from truth.noise import at_rest, power_law
 
 # Thesis A, table 5.3, gyroscope x: (deg/s)/sqrt(Hz), deg/s, (deg/s) sqrt(Hz).
 GYR_X = dict(N=7.867e-3 * DPS, B=1.241e-3 * DPS, K=1.111e-4 * DPS)
@@ -209,7 +209,13 @@ def test_lines_are_read_where_the_formulas_say():
 
 @pytest.mark.parametrize(
     ("symbol", "unit"),
-    [("Q", "m/s^2*s"), ("N", "m/s^2/sqrt(Hz)"), ("B", "m/s^2"), ("K", "m/s^2*sqrt(Hz)"), ("R", "m/s^2/s")],
+    [
+        ("Q", "m/s^2*s"),
+        ("N", "m/s^2/sqrt(Hz)"),
+        ("B", "m/s^2"),
+        ("K", "m/s^2*sqrt(Hz)"),
+        ("R", "m/s^2/s"),
+    ],
 )
 def test_units_of_coefficients(symbol, unit):
     assert coefficient_unit(symbol, "m/s^2") == unit

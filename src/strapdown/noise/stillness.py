@@ -98,6 +98,7 @@ def moving(y: FloatArray, fs: float) -> BoolArray:
     scale = np.maximum(1.4826 * np.median(step, axis=0), least)
     noisy = (std > _STD_FACTOR * usual).any(axis=1) & (usual > 0.0).any()
     stepped = (step > _STEP_FACTOR * scale).any(axis=1)
+    stepped &= ~(noisy[:-1] | noisy[1:])  # else that window explains it
     noisy[:-1] |= stepped
     noisy[1:] |= stepped
     moves[: count * width] = np.repeat(noisy, width)

@@ -27,6 +27,11 @@ _BLOCKS: Final = {
 }
 _EVENT: Final = 17  # time, cell, count, 14 values of a fix
 _TAPE: Final = 1_000_000  # numbers on the smoother's tape: 8 MB, about 80 s at 10 Hz
+_MISFIT: Final = 2.5  # velocity errors per receiver sigma, above which something is wrong
+_DO_NOT_FIT: Final = "the accelerations of the box do not fit the fixes"
+_CHECK: Final = (
+    "check axes (swapped, mirrored), units, and the time stamps of `imu` against `gnss`"
+)
 _AXES: Final = ("north", "east", "down")
 
 
@@ -108,8 +113,8 @@ class LooselyCoupled(Estimator):
     constraint_time : float
         How long what the constraint leaves out stays the same [s].
     rest_gyr, rest_acc : float
-        Deviation over a second, all axes together, below which the car may stand
-        [rad/s], [m/s^2].
+        How much a parked car shakes: deviation over a second, all axes together, beyond the
+        noise of the sensor, below which it may stand [rad/s], [m/s^2].
     tick : float
         Interval of covariance and constraints [s].
     max_gap : float
@@ -191,7 +196,7 @@ class LooselyCoupled(Estimator):
     gate: float = 5.5
     recover: float = 15.0
     std_side: float = 0.05
-    std_up: float = 0.1
+    std_up: float = 0.2
     slip: float = 0.03
     constraint_time: float = 1.0
     rest_gyr: float = 1.5e-3
@@ -466,6 +471,8 @@ class LooselyCoupled(Estimator):
         meta: dict[str, Any] = {"parameters": self.parameters(), "learned": learned}
         if len(status) and np.all(status & _s.ALIGNING):
             meta["advice"] = _advice(float(x[k.A_COUNT]), float(x[k.A_VAR]))
+        elif learned["velocity_scale"] > _MISFIT:
+            meta["advice"] = f"{_DO_NOT_FIT}: trust nothing; {_CHECK}"
         return Solution(
             t=t, status=status, filter=self.NAME, causal=causal, heading_reference="true",
             diagnostics=rows, meta=meta, **arrays,
@@ -499,10 +506,7 @@ def _advice(fixes: float, variance: float) -> str:
             "the fixes hardly move: navigation did not begin; a few seconds of pulling away "
             "suffice"
         )
-    return (
-        "the accelerations of the box do not fit the fixes: navigation did not begin; check "
-        "axes (swapped, mirrored), units, and the time stamps of `imu` against `gnss`"
-    )
+    return f"{_DO_NOT_FIT}: navigation did not begin; {_CHECK}"
 
 
 def _rows(diag: FloatArray) -> dict[str, Diagnostics]:

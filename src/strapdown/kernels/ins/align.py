@@ -54,6 +54,7 @@ FADE = 30.0  # [s]
 SHORTEST = 0.4  # fixes closer than this are left out: their velocity noise is one and the same [s]
 LONGEST = 15.0  # [s]
 WORST_FIT = 25.0  # mean square residual, of what is expected, above which nothing is believed
+LEAST_COUNT = 2.5  # fixes, faded, before anything is believed
 MOST_RESTS = 20.0  # blocks over which the bias is averaged
 
 
@@ -249,5 +250,5 @@ def solve(x: Vec, p: Vec, w: Vec) -> bool:
     # residuals in units of what the weights expect; the loss is theirs
     fit = max((x[A_SQUARES] - 2.0 * trace) / x[A_COUNT] / 3.0, 1.0)
     x[A_VAR] = variance * fit
-    known: bool = x[A_VAR] < p[SD_HEADING] * p[SD_HEADING] and x[A_COUNT] > 4.0
+    known: bool = x[A_VAR] < p[SD_HEADING] * p[SD_HEADING] and x[A_COUNT] > LEAST_COUNT
     return known and fit < WORST_FIT

@@ -297,6 +297,8 @@ def _learn_position(x: Vec, p: Vec, w: Vec, nis: float) -> None:
     k = int(p[I_BP])
     if k > 0:
         slow = min(max(2.0 * x[RHO], 0.0), 1.0)
+        # a drive that is too strong shows in innovations that change sign
+        x[K_POS] = max(x[K_POS] * exp(4.0 * p[LEARN] * min(x[RHO], 0.0)), LEAST_K)
     x[K_POS] = _learn(p, x[K_POS], nis, slow)
     x[K_WHITE] = _learn(p, x[K_WHITE], nis, 1.0 - slow)
 

@@ -2,12 +2,16 @@
 
 The window of four blocks slides by one block, so that sums of each block are all there is to keep.
 Quiet means quiet as a parked car is: a car that creeps shakes its gyroscope three times as much.
+The parameters say how much a parked car shakes; the noise of the sensor comes on top, as the
+quietest window so far shows it.
 """
 
 from strapdown.kernels._jit import Vec, kernel
 from strapdown.kernels.ins.layout import (
     AT_REST,
     BLOCK_DT,
+    FLOOR_A,
+    FLOOR_G,
     REST_A,
     REST_G,
     REST_T,
@@ -16,6 +20,8 @@ from strapdown.kernels.ins.layout import (
 )
 
 BLOCKS = 4
+SPREAD = 1.2  # of a variance over a window of noise
+MOST = 3.0  # a quietest window above so many times the parameter's square was no rest
 
 
 # fmt: off
@@ -71,8 +77,14 @@ def _quiet(x: Vec, p: Vec) -> bool:
             gyr += variance
         else:
             acc += variance
-    quiet: bool = gyr < p[REST_G] * p[REST_G] and acc < p[REST_A] * p[REST_A]
-    return quiet
+    if x[FLOOR_G] == 0.0 or gyr < x[FLOOR_G]:
+        x[FLOOR_G] = gyr
+    if x[FLOOR_A] == 0.0 or acc < x[FLOOR_A]:
+        x[FLOOR_A] = acc
+    g = p[REST_G] * p[REST_G]
+    a = p[REST_A] * p[REST_A]
+    quiet: bool = gyr < g + SPREAD * min(x[FLOOR_G], MOST * g)
+    return quiet and acc < a + SPREAD * min(x[FLOOR_A], MOST * a)
 
 
 @kernel

@@ -4,7 +4,7 @@ The mechanisation runs at the rate of the IMU. At each tick, by default ten time
 at each fix the covariance moves and the constraints act; then comes the fix.
 """
 
-from math import inf, isinf, isnan, nan, sqrt
+from math import inf, isfinite, isinf, isnan, nan, sqrt
 
 from strapdown.kernels import status as s
 from strapdown.kernels._jit import Mat, Vec, kernel
@@ -21,9 +21,11 @@ from strapdown.kernels.ins.layout import (
     A_VAR,
     ACC_N,
     ARM_A,
+    ARM_V,
     AT_REST,
     BA,
     BG,
+    BP,
     CAR,
     CORE,
     D_LAST,
@@ -66,6 +68,7 @@ from strapdown.kernels.ins.layout import (
     REALIGN_GAP,
     RECORD,
     RHO,
+    SA,
     SCALE_V,
     SD_ARM_A,
     SD_BA,
@@ -74,7 +77,9 @@ from strapdown.kernels.ins.layout import (
     SD_SCALE_A,
     SD_SCALE_G,
     SD_SODO,
+    SG,
     SHARE_BP,
+    SODO,
     T_POS,
     T_VEL,
     TAPE,
@@ -87,6 +92,7 @@ from strapdown.kernels.ins.layout import (
     Q,
     V,
 )
+from strapdown.kernels.ins.layout import BARO as BARO_OFFSET
 from strapdown.kernels.ins.mechanise import advance, earth_terms
 from strapdown.kernels.ins.rest import feed as feed_rest
 from strapdown.kernels.ins.rest import forget
@@ -241,6 +247,26 @@ def mind_gap(x: Vec, P: Mat, p: Vec, w: Vec, dt: float) -> None:
 
 
 @kernel
+def sane(x: Vec, P: Mat, p: Vec) -> bool:
+    """Whether the estimates are numbers that a carrier of this sensor can have."""
+    total = 0.0
+    total += x[ARM_V] + x[SODO] + x[BARO_OFFSET] + x[K_POS] + x[K_WHITE] + x[K_VEL]
+    for i in range(4):
+        total += x[Q + i] + x[QVB + i]
+    for i in range(3):
+        total += x[LLA + i] + x[BP + i] + x[ACC_N + i] + x[RATE + i]
+        if not (abs(x[V + i]) < 1e5 and abs(x[BG + i]) < 1.0 and abs(x[BA + i]) < 30.0):
+            return False
+        if not (abs(x[SG + i]) < 0.5 and abs(x[SA + i]) < 0.5 and abs(x[ARM_A + i]) < 1e3):
+            return False
+    for i in range(int(p[N])):
+        total += P[i, i]
+        if P[i, i] < 0.0:
+            return False
+    return isfinite(total) and abs(x[DELAY]) < 5.0
+
+
+@kernel
 def navigate(x: Vec, P: Mat, p: Vec, w: Vec, dt: float) -> None:
     """Tick: covariance, constraints, aiding."""
     fix = x[GNSS] > 0.0
@@ -267,9 +293,27 @@ def navigate(x: Vec, P: Mat, p: Vec, w: Vec, dt: float) -> None:
     if fix:
         x[GNSS] = 0.0
         update_gnss(x, P, p, w)
-    earth_terms(x)
+    if not sane(x, P, p):
+        for i in range(3):
+            x[BG + i] = 0.0
+            x[BA + i] = 0.0
+            x[SG + i] = 0.0
+            x[SA + i] = 0.0
+            x[ARM_A + i] = 0.0
+            x[BP + i] = 0.0
+        x[DELAY] = 0.0
+        x[SODO] = 0.0
+        x[A_REST] = 0.0
+        x[MOUNTED] = 0.0
+        x[ARM_V] = 0.0
+        x[QVB], x[QVB + 1], x[QVB + 2], x[QVB + 3] = 1.0, 0.0, 0.0, 0.0
+        x[BARO_OFFSET] = 0.0
+        x[MODE] = 0.0
     if x[MODE] == 0.0:
+        x[Q], x[Q + 1], x[Q + 2], x[Q + 3] = 1.0, 0.0, 0.0, 0.0
         restart(x)
+    else:
+        earth_terms(x)
 
 
 # fmt: off
@@ -344,10 +388,13 @@ def _use(
 
 @kernel
 def unseen(x: Vec, p: Vec, i: int) -> float:
-    """Variance of the fixes' error that shows in no innovation: constant over minutes [m^2]."""
+    """Variance of the fixes' error that shows in no innovation: constant over minutes [m^2].
+
+    Where the drive that is learned is below half of what the receiver says, the rest is there.
+    """
     if p[I_BP] < 0.0:
         return 0.0
-    rest = p[SHARE_BP] * p[SHARE_BP] - x[K_POS] * x[K_POS]
+    rest = p[SHARE_BP] * p[SHARE_BP] - 4.0 * x[K_POS] * x[K_POS]
     variance: float = max(rest, 0.0) * x[FIX_SD + i] * x[FIX_SD + i]
     return variance
 

@@ -17,6 +17,7 @@ from strapdown.kernels.ins.covariance import (
     reset,
 )
 from strapdown.kernels.ins.layout import (
+    ACC_N,
     ARM_V,
     ARM_V_0,
     BARO,
@@ -70,6 +71,7 @@ BACK_TIME = 5.0  # for so long [s]
 FIXED_MOUNT = 0.03  # error of a mount that is found but not estimated on [rad]
 ROLL_TIME = 5.0  # over which the roll of the road is one and the same [s]
 SPEED_GATE = 9.0
+PULL_AWAY = 0.12  # smoothed horizontal acceleration that ends a standstill [m/s^2]
 
 
 @kernel
@@ -168,6 +170,8 @@ def stand(x: Vec, P: Mat, p: Vec, w: Vec, dt: float) -> None:
     """Zero velocity and zero rate at rest, unless the filter or the last fix contradict."""
     if x[T] - x[FIX_T] < 1.5 and x[FIX_SPEED] > 1.0:
         return
+    if x[ACC_N] * x[ACC_N] + x[ACC_N + 1] * x[ACC_N + 1] > PULL_AWAY * PULL_AWAY:
+        return  # sooner than the window can see it
     clear_correction(p, w)
     r = p[SD_REST_V] * p[SD_REST_V] / dt
     for i in range(3):

@@ -106,3 +106,13 @@ def test_declination_turns_the_heading_that_it_settles_at(declination):
     got, _ = errors(flt, r_nb, [0, 0, 0.1], n=3000, dt=0.02, field=FIELD_N)
     # 60 s at kp (1 - sin dip) = 0.336 leave exp(-20) = 2e-9 of half a radian
     np.testing.assert_allclose(got[-1], [0, 0, -declination], atol=1e-8)
+
+
+def test_without_vectors_it_only_integrates():
+    flt, rate = Mahony(kp=0.7, ki=0.3), np.array([0.5, -0.8, 1.3])
+    r_nb = Rotation.from_euler("ZYX", [1.0, -0.4, 2.5])
+    x, P = start(flt, scalar_first(r_nb), [0.02, -0.01, 0.03])
+    feed(flt, x, P, 0.02, rate, np.full(3, np.inf))
+    want = r_nb * Rotation.from_rotvec((rate - [0.02, -0.01, 0.03]) * 0.02)
+    assert (rotation(quat(x)) * want.inv()).magnitude() < 1e-14
+    assert np.array_equal(bias(x), [0.02, -0.01, 0.03])

@@ -14,6 +14,7 @@ from strapdown.cli import (
     _console,
     _errors,
     calibrate,
+    characterize,
     compare,
     convert,
     demo,
@@ -39,6 +40,7 @@ app.command("convert")(convert.convert)
 app.command("compare")(compare.compare)
 app.command("outages")(outages.outages)
 app.command("filters")(filters.filters)
+app.command("characterize")(characterize.characterize)
 app.add_typer(calibrate.app, name="calibrate")
 app.command("simulate")(simulate.simulate)
 

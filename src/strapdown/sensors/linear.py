@@ -286,13 +286,16 @@ class Linear:
         if self.quadratic == ZERO or x.size == 0:
             return x
         Q, change = np.array(self.quadratic).T, float("inf")
+        largest = float(np.nanmax(np.abs(x), initial=0.0))
         for _ in range(MOST_ITERATIONS):
-            before = x
+            before, last = x, change
             x = np.asarray((offset - (x * x) @ Q) @ back)
             change = float(np.nanmax(np.abs(x - before), initial=0.0))
-            if change <= 4e-16 * float(np.nanmax(np.abs(x), initial=0.0)):
+            if change <= 4e-16 * largest:
                 return x
-        if not change <= 1e-12 * float(np.nanmax(np.abs(x), initial=0.0)):
+            if change > 2.0 * last:  # it runs away
+                break
+        if not change <= 1e-12 * largest:
             raise NotConverged(
                 "inverse of the quadratic error", MOST_ITERATIONS, change, "lower `quadratic`"
             )

@@ -10,6 +10,8 @@ from strapdown import _checks
 from strapdown._types import BoolArray, FloatArray
 from strapdown.sensors.settings import Quantity
 
+SAME_TIME = 4e-15  # of the length of a recording
+
 
 class Ticks(NamedTuple):
     """Sampling times of one sensor.
@@ -192,10 +194,11 @@ def _transfer(A: Any, B: Any, C: Any, D: Any) -> tuple[FloatArray, FloatArray]:
 
 def _at(t: FloatArray, x: FloatArray, when: FloatArray) -> FloatArray:
     """Return the signal at any times; beyond the ends it keeps its last value."""
-    index = np.clip(np.searchsorted(t, when), 0, len(t) - 1)
-    if np.array_equal(t[index], when):
-        return x[index]
-    if len(t) < 2:
+    after = np.clip(np.searchsorted(t, when), 0, len(t) - 1)
+    before = np.maximum(after - 1, 0)
+    index = np.where(np.abs(t[before] - when) < np.abs(t[after] - when), before, after)
+    # times that differ by rounding alone are the same
+    if len(t) < 2 or np.abs(t[index] - when).max(initial=0.0) <= SAME_TIME * (t[-1] - t[0]):
         return x[index]
     from scipy.interpolate import CubicSpline
 

@@ -121,10 +121,10 @@ def spline(t: FloatArray, x: FloatArray) -> Any:
 
 
 def free_spline(u: FloatArray, x: FloatArray) -> Smooth:
-    """Return the quintic spline through points whose ends are free (not-a-knot)."""
+    """Return the spline of degree 7 through points, at least eight, whose ends are free."""
     from scipy.interpolate import make_interp_spline
 
-    function: Smooth = make_interp_spline(u, x, k=5)
+    function: Smooth = make_interp_spline(u, x, k=7)
     return function
 
 

@@ -23,13 +23,13 @@ STEEPEST_RAMP = 1.875  # largest slope of the ramp 10 s^3 - 15 s^4 + 6 s^5
 class Drive:
     """A road vehicle along a smooth track, with stops; its x axis follows the track.
 
-    The track is a quintic spline through the points over the length of the straight lines
+    The track is a spline of degree 7 through the points over the length of the straight lines
     between them, so the speed differs from the wanted one by some per cent in bends.
 
     Parameters
     ----------
     points : tuple of (float, float, float)
-        North, east, down of the track's points [m]; at least six.
+        North, east, down of the track's points [m]; at least eight.
     speed : float
         Wanted speed [m/s].
     acceleration : float
@@ -58,8 +58,8 @@ class Drive:
     def __post_init__(self) -> None:
         """Check the track."""
         points = _checks.as_samples("points", self.points if self.points else np.empty((0, 3)))
-        if len(points) < 6:
-            raise ValueError(f"`points` must hold at least six points, got {len(points)}.")
+        if len(points) < 8:
+            raise ValueError(f"`points` must hold at least eight points, got {len(points)}.")
         if (np.linalg.norm(np.diff(points, axis=0), axis=1) == 0.0).any():
             raise ValueError("`points` must differ from each to the next.")
         _checks.positive("speed", self.speed)
@@ -115,8 +115,8 @@ class Flight(Drive):
     """A fixed-wing flight along a smooth track, banked so that no force acts sideways.
 
     Bank follows from the path's curvature and speed: ``tan(roll) = f_y / -f_z`` of the unbanked
-    axes, with the Coriolis force left out (0.001 m/s^2 at 10 m/s stays sideways). The x axis
-    follows the path: no angle of attack, no sideslip. It starts and ends at rest.
+    axes, with standard gravity and without the Coriolis force: some mm/s^2 stay sideways. The x
+    axis follows the path: no angle of attack, no sideslip. It starts and ends at rest.
 
     Parameters are those of `Drive`.
     """

@@ -30,7 +30,7 @@ from scipy.optimize import brentq, nnls
 from scipy.stats import chi2
 from scipy.stats import t as student
 
-from strapdown._types import FloatArray, IntArray
+from strapdown._types import BoolArray, FloatArray, IntArray
 from strapdown.kernels import toeplitz as _k
 from strapdown.noise.covariance import TERMS, Moments, difference_covariance
 
@@ -42,10 +42,10 @@ _ROOT = 2e-3  # relative tolerance of the ends of an interval
 _MISFIT_LEVEL = 1e-3  # chance at which residuals count as a misfit
 _LEAST_MODEL_ERROR = 1e-4
 _MAX_MODEL_ERROR = 3.0  # beyond it a curve has nothing to do with the terms
-EVIDENCE: Final = 7.0  # gain of 2 log L that shows a term: chance 0.4 % where there is none
+_EVIDENCE: Final = 7.0  # gain of 2 log L that shows a term: chance 0.4 % where there is none
 _CONFIDENCE: Final = 0.95
 _ONE_SIDED: Final = float(chi2.ppf(2.0 * _CONFIDENCE - 1.0, 1))
-_RAMP_EVIDENCE: Final = float(chi2.ppf(0.999, 1))  # a ramp must be beyond doubt
+_RAMP_EVIDENCE: Final = float(chi2.ppf(0.9999, 1))  # a random walk makes ramps too
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -84,10 +84,11 @@ class CurveFit:
     std : ndarray, shape (4,)
         Their standard deviations; NaN for a term at zero.
     low, high : ndarray, shape (4,)
-        Interval of 95 %. Without evidence for the term `low` is 0 and `high` is the limit
+        Interval of 95 %. Of a term that is not shown `low` is 0 and `high` is the limit
         from above, one-sided 95 %, infinite where the record sets none.
-    evidence : ndarray, shape (4,)
-        Twice the gain in log likelihood from the term.
+    shown : ndarray of bool, shape (4,)
+        Whether the data show the term: the gain in likelihood from it is beyond chance, and
+        its interval does not reach zero.
     ramp, ramp_std : float
         Change of the rate per sample, and its standard deviation.
     has_ramp : bool
@@ -104,7 +105,7 @@ class CurveFit:
     std: FloatArray
     low: FloatArray
     high: FloatArray
-    evidence: FloatArray
+    shown: BoolArray
     ramp: float
     ramp_std: float
     has_ramp: bool
@@ -149,17 +150,18 @@ class Fit:
         best = problem.loss(theta)
         count = len(TERMS)
         std, low, high = np.full(count, np.nan), np.zeros(count), np.full(count, np.inf)
-        evidence = np.zeros(count)
+        shown = np.zeros(count, dtype=np.bool_)
         there = np.flatnonzero(theta > 0.0)
         covariance = np.linalg.inv(problem.information(theta)[np.ix_(there, there)])
         std[there] = np.sqrt(np.diag(covariance))
         for k in range(count):
-            evidence[k] = max(problem.profile(k, 0.0, theta)[0] - best, 0.0)
-            if evidence[k] < EVIDENCE:
+            evidence = problem.profile(k, 0.0, theta)[0] - best
+            fall = _interval_fall(theta[k], std[k]) if theta[k] > 0.0 else np.inf
+            shown[k] = evidence > max(_EVIDENCE, fall)
+            if not shown[k]:
                 step = std[k] if theta[k] > 0.0 else problem.first_step(theta, k)
                 high[k] = _crossing(problem, k, theta, step, best + _ONE_SIDED)
                 continue
-            fall = _interval_fall(theta[k], std[k])
             if std[k] < _SHARP * theta[k]:  # the likelihood is a parabola this near its top
                 reach = np.sqrt(fall) * std[k]
                 low[k], high[k] = theta[k] - reach, theta[k] + reach
@@ -171,7 +173,7 @@ class Fit:
             std=std * scale,
             low=low * scale,
             high=high * scale,
-            evidence=evidence,
+            shown=shown,
             ramp=self._ramp[0] * np.sqrt(scale),
             ramp_std=self._ramp[1] * np.sqrt(scale),
             has_ramp=problem.ramp,

@@ -32,7 +32,7 @@ from strapdown.noise.coefficients import (
     Status,
 )
 from strapdown.noise.covariance import TERMS, moments
-from strapdown.noise.fit import EVIDENCE, CurveFit, Data, Fit
+from strapdown.noise.fit import CurveFit, Data, Fit
 from strapdown.noise.stillness import require_signal
 
 LEAST_SAMPLES: Final = 256
@@ -165,7 +165,7 @@ def _verdict(
     value = math.sqrt(fit.squares[k]) * scale
     std = 0.5 * fit.std[k] / math.sqrt(fit.squares[k]) * scale if value > 0.0 else math.nan
     low, high = math.sqrt(max(fit.low[k], 0.0)) * scale, math.sqrt(fit.high[k]) * scale
-    if fit.evidence[k] < EVIDENCE or not std <= _WIDEST * value:
+    if not fit.shown[k] or not std <= _WIDEST * value:
         limit = f"below {high:.3g}" if math.isfinite(high) else "without a limit"
         return Coefficient(
             symbol=symbol,

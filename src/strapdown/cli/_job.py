@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from strapdown import __version__
-from strapdown.cli import _console, _errors, _output, _settings
+from strapdown.cli import _console, _errors, _output, _settings, doctor
 from strapdown.errors import DataGap, InputError
 
 if TYPE_CHECKING:
@@ -70,6 +70,8 @@ def do(job: Job, log: str, read: Callable[[], "Recording"]) -> None:
         timing = {"read_s": time.perf_counter() - begun}
         for note in rec.meta.get("notes", ()):
             progress.note(note)
+        for line in doctor.brief(rec):
+            progress.note(line)
         summary = _results(job, log, rec, aside, timing, progress)
         _output.write_text(aside / _output.SUMMARY, _console.to_json(summary))
     if job.json:

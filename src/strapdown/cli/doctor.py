@@ -92,12 +92,17 @@ def _print(log: str, findings: "tuple[Finding, ...]") -> None:
 
 
 def brief(rec: "Recording") -> list[str]:
-    """Return one line for other verbs: the gravest alarm, or none.
+    """Return one line for other verbs, or none: the gravest alarm of a quick look.
 
     Parameters
     ----------
     rec : Recording
         The log.
+
+    Returns
+    -------
+    list of str
+        Empty if there is nothing to object to.
     """
     from strapdown.doctor import examine
 
@@ -105,4 +110,4 @@ def brief(rec: "Recording") -> list[str]:
     if not alarms:
         return []
     more = f" (and {len(alarms) - 1} more)" if len(alarms) > 1 else ""
-    return [f"{alarms[0].sentence} See `strapdown doctor`{more}."]
+    return [f"{alarms[0].sentence} `strapdown doctor` says what to do{more}."]

@@ -3,7 +3,7 @@
 import re
 from typing import TYPE_CHECKING, Any
 
-from strapdown.cli import _console, _options
+from strapdown.cli import _console, _options, doctor
 
 if TYPE_CHECKING:
     from strapdown.recording import Recording
@@ -31,7 +31,7 @@ def _facts(rec: "Recording") -> dict[str, Any]:
     for row in rec.info():
         facts = {key: getattr(row, key) for key in row.__slots__}
         streams[facts.pop("name")] = facts
-    return {"streams": streams, "meta": dict(rec.meta)}
+    return {"streams": streams, "meta": dict(rec.meta), "findings": doctor.brief(rec)}
 
 
 def _brief(columns: tuple[str, ...]) -> str:
@@ -66,3 +66,5 @@ def _print(log: str, rec: "Recording") -> None:
                 _console.note(note)
         else:
             _console.print_fact(key, value)
+    for line in doctor.brief(rec):
+        _console.note(line)

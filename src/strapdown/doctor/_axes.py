@@ -1,7 +1,8 @@
 """Which sensor's axes, and which unit of the gyroscope, agree with how the world turns."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from functools import partial
 from typing import Final
 
 import numpy as np
@@ -19,6 +20,8 @@ from strapdown.units import DPS
 _EXPLAINED: Final = 0.15
 # Asked first: the unit as stated, a half and the double of it, and degrees for radians.
 _USUAL_SCALES: Final = [1.0, 0.5, 2.0, DPS, 1.0 / DPS]
+
+_Ask = Callable[[list[float]], tuple[FloatArray, bool] | None]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -67,43 +70,54 @@ def relations(log: Log, grid: Grid, *, quick: bool = False) -> list[Relation]:
     gyr = grid.fields["gyr"] - rest_bias(grid.fields["gyr"], grid.dt)
     gyr[grid.bad] = 0.0
     found = []
-    for sensor in ("mag", "acc"):
+    for sensor in ("acc", "mag"):
         if sensor not in grid.fields:
             continue
-        relation = _relation(log, grid, gyr, sensor, [1.0] if quick else _USUAL_SCALES)
-        settled = relation is not None and relation.decided and relation.scale == 1.0
-        if not quick and not settled:
-            scales = scales_of("gyr", log.sensors["gyr"].unit)
-            relation = _relation(log, grid, gyr, sensor, scales) or relation
+        ask = partial(_losses, log, grid, gyr, sensor)
+        scale = 1.0
+        if not quick:
+            scale = _scale(ask, _USUAL_SCALES)
+            relation = _relation(sensor, ask, 1.0) if scale == 1.0 else None
+            if relation is None or not relation.decided:
+                scale = _scale(ask, scales_of("gyr", log.sensors["gyr"].unit))
+        relation = _relation(sensor, ask, scale)
         if relation is not None:
             found.append(relation)
-    return found[::-1]
+    return found
 
 
-def _relation(
+def _losses(
     log: Log, grid: Grid, gyr: FloatArray, sensor: str, scales: list[float]
-) -> Relation | None:
+) -> tuple[FloatArray, bool] | None:
+    """Return how badly each hypothesis explains the turning, and whether its sign is among them.
+
+    The array has shape (blocks, scales, 48), or 96 where the course tells the field's sign: the
+    second half is for the opposite of the field. None where nothing is explained.
+    """
     values = grid.fields[sensor]
     evidence = turning(gyr, values, grid.dt, grid.bad, scales)
     if evidence is None:
         return None
     loss = evidence.loss
-    both = np.concatenate((loss, loss), axis=2)  # the field's sign: as recorded, and opposite
-    turns = None
     if sensor == "acc" and log.gnss is not None:
         turns = turns_of(log.gnss, grid.t, gyr, values)
-    if turns is not None:
-        course = course_loss(turns, scales, len(values) * grid.dt)
-        mirrored = [index_of(-Q) for Q in SIGNED]
-        both[:, :, :48] += course
-        both[:, :, 48:] += course[:, :, mirrored]
-    elif evidence.residual > _EXPLAINED:
+        if turns is not None:
+            course = course_loss(turns, scales, len(values) * grid.dt)
+            mirrored = [index_of(-Q) for Q in SIGNED]
+            opposite = loss + course[:, :, mirrored]
+            return np.concatenate((loss + course, opposite), axis=2), True
+    return (loss, False) if evidence.residual <= _EXPLAINED else None
+
+
+def _relation(sensor: str, ask: _Ask, scale: float) -> Relation | None:
+    """Return what remains of the hypotheses at one scale."""
+    answer = ask([scale])
+    if answer is None:
         return None
-    used = both if turns is not None else loss
-    k = _scale(used)
-    alive, confidence = survivors(used[:, k])
-    signs = [(int(i) % 48, 0 if turns is None else (1 if i < 48 else -1)) for i in alive]
-    return Relation(sensor, scales[k], _without_sign(signs), confidence)
+    loss, signed = answer
+    alive, confidence = survivors(loss[:, 0])
+    signs = [(int(i) % 48, 0 if not signed else (1 if i < 48 else -1)) for i in alive]
+    return Relation(sensor, scale, _without_sign(signs), confidence)
 
 
 def _without_sign(alive: list[tuple[int, int]]) -> list[tuple[int, int]]:
@@ -112,16 +126,20 @@ def _without_sign(alive: list[tuple[int, int]]) -> list[tuple[int, int]]:
     return list(dict.fromkeys((q, 0 if q in both else sign) for q, sign in alive))
 
 
-def _scale(loss: FloatArray) -> int:
+def _scale(ask: _Ask, scales: list[float]) -> float:
     """Return the scale that explains most; another than one only when it leads clearly."""
+    answer = ask(scales)
+    if answer is None:
+        return 1.0
+    loss, _ = answer
     best = loss.sum(axis=0).min(axis=1)
     k = int(best.argmin())
     if k == 0 or best[0] - best[k] < DECIDED:
-        return 0
+        return 1.0
     first, second = np.partition(loss[:, k].sum(axis=0), 1)[:2]
     columns = np.stack([loss[:, i, int(loss[:, i].sum(axis=0).argmin())] for i in (k, 0)], axis=1)
     _, confidence = survivors(columns)
-    return k if confidence >= SURE and second - first >= 0.5 * DECIDED else 0
+    return scales[k] if confidence >= SURE and second - first >= 0.5 * DECIDED else 1.0
 
 
 def axes_findings(log: Log, found: Iterable[Relation]) -> list[Finding]:

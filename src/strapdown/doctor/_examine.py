@@ -79,7 +79,7 @@ def examine(
 def _placed(log: Log, place: Sequence[float]) -> Log:
     """Return the log with a place in its metadata, which outranks its fixes."""
     point = as_vector("place", [*place, 0.0][:3])
-    in_range("latitude of `place`", point[0], -0.5 * np.pi, 0.5 * np.pi)
+    in_range("place[0]", float(point[0]), -0.5 * np.pi, 0.5 * np.pi)
     names = ("lat_rad", "lon_rad", "height_m")
     return replace(log, meta={**log.meta, **dict(zip(names, point.tolist(), strict=True))})
 

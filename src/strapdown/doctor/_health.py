@@ -121,14 +121,12 @@ def _clipped(name: str, sensor: Sensor) -> Finding | None:
     for column, axis in zip(values.T, "xyz", strict=True):
         if len(column) < 10:
             continue
-        spread = float(np.quantile(np.abs(column - np.median(column)), 0.5))
         for extreme in (column.max(), column.min()):
             at = column == extreme
             count = int(at.sum())
-            if count < _CLIPPED_LEAST or abs(extreme - np.median(column)) < 4.0 * spread:
+            # A coarse sensor at rest stands on its extremes too.
+            if count < _CLIPPED_LEAST or np.ptp(column) < 50.0 * _resolution(column):
                 continue
-            if np.ptp(column) < 50.0 * _resolution(column):
-                continue  # a coarse sensor at rest stands on its extremes too
             if count > worst and _run_of(at) >= _CLIPPED_RUN:
                 worst, where = count, f"{axis} at {extreme:.4g}"
     if not worst:

@@ -72,14 +72,20 @@ def averaged(t: FloatArray, *fields: FloatArray) -> tuple[FloatArray, ...]:
 
 
 def rest_bias(gyr: FloatArray, dt: float) -> FloatArray:
-    """Return the rate in the quietest seconds, whatever its unit, shape (3,)."""
+    """Return the rate on which the quietest seconds agree, else zero, shape (3,).
+
+    At rest they do; in a slow, smooth motion the quietest are those of the largest rates.
+    """
     m = max(round(1.0 / dt), 1)
     blocks = gyr[: len(gyr) // m * m].reshape(-1, m, 3)
     if not len(blocks):
         return np.zeros(3)
     noise = np.linalg.norm(blocks.std(axis=1), axis=1)
     quiet = noise <= 2.0 * np.quantile(noise, 0.05)
-    return np.asarray(np.median(blocks.mean(axis=1)[quiet], axis=0))
+    means = blocks.mean(axis=1)[quiet]
+    bias = np.median(means, axis=0)
+    spread = float(np.median(np.linalg.norm(means - bias, axis=1)))
+    return np.asarray(bias if spread < 0.6 * np.linalg.norm(bias) else np.zeros(3))
 
 
 def turning(

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
         noise,
         report,
         rotation,
+        sensors,
         simulation,
         units,
     )
@@ -74,6 +75,7 @@ __all__ = [
     "read",
     "report",
     "rotation",
+    "sensors",
     "simulation",
     "units",
     "write",

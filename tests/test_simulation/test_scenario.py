@@ -109,7 +109,7 @@ def test_individual_parts_differ_by_seed():
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("rate_rpm", "rate_rmp", r"\[motion\]: unknown key 'rate_rmp'; the nearest name is 'rate_rpm'"),
+        ("rate_rpm", "rate_rmp", r"\[motion\]: unknown key 'rate_rmp'; .* is 'rate_rpm'"),
         ("rate_rpm = 45", "rate = 45", r"unknown key 'rate'; the nearest name is"),
         ('"turntable"', '"turntabel"', r"\[motion\], kind: .*nearest name is 'turntable'"),
         ("[place]", "[plase]", "unknown key 'plase'; the nearest name is 'place'"),
@@ -118,9 +118,9 @@ def test_individual_parts_differ_by_seed():
         ("[sensors.star]", "[sensors.stars]", "unknown key 'stars'; the nearest name is 'star'"),
         ("white_dps_per", "wite_dps_per", r"\[sensors.gyr\].noise: unknown key 'wite_dps"),
         ("spin_s = 0.5", "spin_s = -1", r"\[motion\]: `spin` must be positive"),
-        ("spin_s = 0.5", "spin_s = 1\nspin_ms = 5", "'spin_ms' is given twice, in different units"),
+        ("spin_s = 0.5", "spin_s = 1\nspin_ms = 5", "'spin_ms' is given twice"),
         ("= 50\n[place]", "= 70\n[place]", "`reference_rate` must be `rate` divided by a whole"),
-        ("[sensors.gyr.noise]", "[sensors.gyr.noise]\n[sensors.gyr.noise.white]", "unknown key 'white'"),
+        ("[sensors.star]", "[sensors.gyr.noise.white]\n[sensors.star]", "unknown key 'white'"),
         ("[mount]\nrpy_deg = [0, 0, 90]", "", None),
     ],
 )  # fmt: skip
@@ -159,7 +159,7 @@ def test_command_lists_the_shipped_scenarios(capsys):
 def test_command_writes_a_recording_by_path_or_name(quick, tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert main(["simulate", str(quick), "--seed", "7"]) == 0
-    assert "quick.parquet: imu, mag, star" in capsys.readouterr().out
+    assert "quick.parquet: imu, mag, temperature, star" in capsys.readouterr().out
     assert np.array_equal(sd.read("quick.parquet").imu.gyr, load(quick).record(7).imu.gyr)
     assert main(["simulate", "static", "-o", "still.parquet"]) == 0
     assert sd.read("still.parquet").meta["name"] == "static"

@@ -111,8 +111,8 @@ def si_value(value: float, unit: str) -> float:
 
     Examples
     --------
-    >>> round(si_value(16384, "LSB/g"), 9)  # m/s^2 per count
-    0.000598551
+    >>> round(si_value(16384, "LSB/g"), 6)  # m/s^2 per count
+    0.000599
     """
     if unit == "":
         return value

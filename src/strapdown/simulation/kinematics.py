@@ -115,8 +115,8 @@ def truth(
     --------
     >>> from strapdown.simulation.motions import Static
     >>> truth(Static(), [0.0, 1.0], [0.8, 0.2, 500.0]).f_b.round(3)
-    array([[ 0.   ,  0.   , -9.806],
-           [ 0.   ,  0.   , -9.806]])
+    array([[ 0.   ,  0.   , -9.805],
+           [ 0.   ,  0.   , -9.805]])
     """
     times, origin = as_times("t", t), as_vector("place", place)
     mount = as_quats("q_vb", q_vb)

@@ -9,8 +9,18 @@ from strapdown.attitude.madgwick import Madgwick
 from strapdown.attitude.mahony import Mahony
 from strapdown.attitude.mekf import Mekf
 from strapdown.attitude.robust_eskf import RobustEskf
+from strapdown.attitude.two_stage import TwoStage
 
-__all__ = ["GyroIntegration", "Madgwick", "Mahony", "Mekf", "RobustEskf", "create", "declination"]
+__all__ = [
+    "GyroIntegration",
+    "Madgwick",
+    "Mahony",
+    "Mekf",
+    "RobustEskf",
+    "TwoStage",
+    "create",
+    "declination",
+]
 
 
 def create(name: str, **parameters: Any) -> Any:

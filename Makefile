@@ -25,7 +25,7 @@ check: $(STAMPS)/dev  ## format, lint, docstrings, types, layers, spelling, kern
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
-	$(BIN)/codespell $$(git ls-files)
+	$(BIN)/codespell $$(git ls-files -- ':!tests')
 	NUMBA_DISABLE_JIT=1 $(BIN)/python -m pytest -n auto -q -m 'not slow' tests/test_kernels
 	! git grep -nIE '/(work|root|home|Users)/[a-z]'
 

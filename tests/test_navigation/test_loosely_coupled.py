@@ -1,11 +1,9 @@
 """The loosely coupled filter on simulated drives with a closed-form truth."""
 
-import importlib.util
-import sys
 from dataclasses import replace
 from itertools import pairwise
-from pathlib import Path
 
+import drive
 import numpy as np
 import pytest
 
@@ -13,11 +11,6 @@ from strapdown import estimator
 from strapdown.navigation import LooselyCoupled
 from strapdown.recording import Baro, Gnss, Imu, Recording, Speed
 from strapdown.solution import Outcome, Status
-
-_spec = importlib.util.spec_from_file_location("drive", Path(__file__).with_name("drive.py"))
-drive = importlib.util.module_from_spec(_spec)
-sys.modules["drive"] = drive
-_spec.loader.exec_module(drive)
 
 FLT = LooselyCoupled()
 ARRAYS = ("q_nb", "lla", "v_n", "gyr_bias", "acc_bias", "q_vb", "std_position_n", "status")
@@ -547,6 +540,29 @@ def test_the_covariance_stays_positive_and_symmetric_to_the_bit(city):
     scale = np.sqrt(np.maximum(np.diag(state.P), 1e-300))
     used = np.diag(state.P) > 0
     assert np.linalg.eigvalsh((state.P / scale / scale[:, None])[np.ix_(used, used)]).min() > 0
+
+
+@pytest.mark.slow
+def test_the_covariance_stays_positive_for_a_day_of_driving():
+    state = FLT.init()
+    lla, heading = (0.83, 0.15, 400.0), 0.7
+    for chunk in range(144):
+        d = drive.simulate(
+            seed=chunk, duration=600.0, rate=20.0, lla0=lla, heading0=heading,
+            ramps=[(a + s, b + s, dv) for s in (0, 300) for a, b, dv in drive.CITY],
+        )  # fmt: skip
+        t0 = 600.0 * chunk
+        sol, state = FLT.advance(
+            state,
+            replace(d.rec, imu=d.rec.imu.shifted(t0), gnss=d.rec.gnss.shifted(t0)),
+        )
+        lla, heading = tuple(d.lla[-1]), d.heading[-1]
+        np.testing.assert_array_equal(state.P, state.P.T)
+        used = np.diag(state.P) > 0
+        scale = np.sqrt(np.diag(state.P)[used])
+        P = state.P[np.ix_(used, used)] / scale / scale[:, None]
+        assert np.linalg.eigvalsh(P).min() > 1e-9, chunk
+    assert horizontal(sol, d).max() < 3.0
 
 
 # --- arguments -------------------------------------------------------------------------

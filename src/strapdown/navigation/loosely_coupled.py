@@ -377,7 +377,7 @@ class LooselyCoupled(Estimator):
             cuts.append((row, j, x.copy(), P.copy()))
             row, j = s.forward(x, P, p, w, imu.t, imu.gyr, imu.acc, events, row, j, out, nothing)
         end = x.copy()
-        stops = [cut[0] for cut in cuts[1:]] + [len(imu)]
+        stops = [cut[0] for cut in cuts[1:]] + [len(imu)] * bool(cuts)
         longest = max((b - c[0] for b, c in zip(stops, cuts, strict=True)), default=0)
         nominal = np.empty((longest, s.NOMINAL))
         lam, Lam, d = np.zeros(n), np.zeros((n, n)), np.zeros(n)

@@ -79,7 +79,8 @@ def relations(log: Log, grid: Grid, *, quick: bool = False) -> list[Relation]:
             scale = _scale(ask, _USUAL_SCALES)
             relation = _relation(sensor, ask, 1.0) if scale == 1.0 else None
             if relation is None or not relation.decided:
-                scale = _scale(ask, scales_of("gyr", log.sensors["gyr"].unit))
+                other = _scale(ask, scales_of("gyr", log.sensors["gyr"].unit))
+                scale = other if other != 1.0 else scale
         relation = _relation(sensor, ask, scale)
         if relation is not None:
             found.append(relation)

@@ -12,11 +12,13 @@ from strapdown.doctor import _axes, _field, _fixes, _health, _scales, _time
 from strapdown.doctor._finding import Finding, Severity, worst_first
 from strapdown.doctor._log import Grid, Log, grid_of, log_of
 from strapdown.io._raw import RawLog
-from strapdown.motion import rest_mask
+from strapdown.motion import RestTest, rest_mask
 from strapdown.recording import Recording
+from strapdown.units import DPS
 
 _LONGEST_S: Final = 1800.0  # of a longer log, its first part of this length is asked about axes
 _QUICK_S: Final = 100.0
+_LARGEST_BIAS: Final = 12.0 * DPS  # a larger mean rate is taken for motion
 _REST_S: Final = 3.0  # of rest in all, for a bias
 
 
@@ -103,7 +105,8 @@ def _rest(grid: Grid, scale: float) -> BoolArray | None:
     """Return where the box rests, or None if it hardly ever does."""
     if "acc" not in grid.fields:
         return None
-    rest = rest_mask(grid.t, scale * grid.fields["gyr"], grid.fields["acc"]) & ~grid.bad
+    gyr, acc = scale * grid.fields["gyr"], grid.fields["acc"]
+    rest = rest_mask(grid.t, gyr, acc, RestTest(max_rate=_LARGEST_BIAS)) & ~grid.bad
     return rest if rest.sum() * grid.dt > _REST_S else None
 
 

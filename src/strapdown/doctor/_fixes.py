@@ -11,7 +11,7 @@ from strapdown.doctor._turning import rest_bias
 from strapdown.recording import Gnss
 from strapdown.units import DEG
 
-_LAGS_S: Final = np.arange(-1.5, 1.5001, 0.05)
+_LAGS_S: Final = np.arange(-3.0, 3.01, 0.1)
 _LATE_NOTE_S: Final = 0.15
 _LATE_WARNING_S: Final = 0.4
 _LEVER_M: Final = 3.0  # an antenna so far ahead of the turning point leads by this over the speed

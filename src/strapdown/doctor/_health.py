@@ -124,8 +124,8 @@ def _clipped(name: str, sensor: Sensor) -> Finding | None:
         for extreme in (column.max(), column.min()):
             at = column == extreme
             count = int(at.sum())
-            # A coarse sensor at rest stands on its extremes too.
-            if count < _CLIPPED_LEAST or np.ptp(column) < 50.0 * _resolution(column):
+            # A coarse sensor at rest stands on its extremes too, and a stuck one always.
+            if count < _CLIPPED_LEAST or np.ptp(column) <= 50.0 * _resolution(column):
                 continue
             if count > worst and _run_of(at) >= _CLIPPED_RUN:
                 worst, where = count, f"{axis} at {extreme:.4g}"

@@ -17,6 +17,7 @@ _LEAST_WINDOW: Final = 16  # samples
 _LEAST_WINDOWS: Final = 8
 _STD_FACTOR: Final = 3.0  # a window this much noisier than the median one is motion
 _STEP_FACTOR: Final = 10.0  # so is a step between windows of so many usual ones
+_SHORT_REST: Final = 10  # windows
 _CLIPPED_SHARE: Final = 1e-3  # of the samples at one end of the range
 _LEAST_LEVELS: Final = 8  # fewer values are coarse resolution, and tell nothing of clipping
 
@@ -101,6 +102,11 @@ def moving(y: FloatArray, fs: float) -> BoolArray:
     stepped &= ~(noisy[:-1] | noisy[1:])  # else that window explains it
     noisy[:-1] |= stepped
     noisy[1:] |= stepped
+    # A steady turn shows at its ends alone: short rests between two motions are none.
+    hits = np.flatnonzero(noisy)
+    for first, last in zip(hits[:-1], hits[1:], strict=True):
+        if last - first <= _SHORT_REST:
+            noisy[first:last] = True
     moves[: count * width] = np.repeat(noisy, width)
     moves[count * width :] = noisy[-1]
     return moves

@@ -151,12 +151,20 @@ def _deviation_panel(
                 y=level[shown] / size,
                 name=f"{term.symbol} {NAMES[term.symbol]}",
                 color=_TERM_COLORS[term.symbol],
+                kind="path",  # a line would break where logarithmic steps grow
                 dash="dash" if term.observed else "dot",
             )
         )
     fitted = tau[tau >= c.tau_min]
     items.append(
-        Series(x=fitted, y=c.deviation(fitted) / size, name="fit", color="#000", width=1.6)
+        Series(
+            x=fitted,
+            y=c.deviation(fitted) / size,
+            name="fit",
+            color="#000",
+            kind="path",
+            width=1.6,
+        )
     )
     items.append(
         Series(
@@ -169,9 +177,8 @@ def _deviation_panel(
         )
     )
     return Panel(
-        title=letter,
         x_label="averaging time [s]",
-        y_label=f"deviation [{symbol}]",
+        y_label=f"{letter}: deviation [{symbol}]",
         items=items,
         height=300,
         log_x=True,
@@ -193,6 +200,7 @@ def _spectrum_figure(
                 y=spectrum.amplitude[rows] / size,
                 name=letter,
                 color=AXIS_COLORS[k],
+                kind="path",
                 width=1.0,
             )
         )
@@ -207,6 +215,7 @@ def _spectrum_figure(
                 y=np.full(2, math.sqrt(2.0) * white.value / size),
                 name="sqrt(2) N",
                 color=REFERENCE if white.observed else MUTED,
+                kind="path",
                 dash="dash",
             )
         )

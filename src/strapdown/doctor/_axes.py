@@ -13,7 +13,7 @@ from strapdown.doctor._course import course_loss, turns_of
 from strapdown.doctor._finding import Finding, Severity
 from strapdown.doctor._log import Grid, Log
 from strapdown.doctor._scales import WORD, mistake_finding, scales_of
-from strapdown.doctor._turning import DECIDED, SURE, rest_bias, survivors, turning
+from strapdown.doctor._turning import DECIDED, SURE, Turning, rest_bias, survivors
 from strapdown.units import DPS
 
 # What is left unexplained where a hypothesis is believed, relative to the field.
@@ -69,11 +69,11 @@ def relations(log: Log, grid: Grid, *, quick: bool = False) -> list[Relation]:
     """
     gyr = grid.fields["gyr"] - rest_bias(grid.fields["gyr"], grid.dt)
     gyr[grid.bad] = 0.0
+    fields = {name: values for name, values in grid.fields.items() if name != "gyr"}
+    turning = Turning(gyr, fields, grid.dt, grid.bad)
     found = []
-    for sensor in ("acc", "mag"):
-        if sensor not in grid.fields:
-            continue
-        ask = partial(_losses, log, grid, gyr, sensor)
+    for sensor in fields:
+        ask = partial(_losses, log, grid, gyr, turning, sensor)
         scale = 1.0
         if not quick:
             scale = _scale(ask, _USUAL_SCALES)
@@ -88,7 +88,7 @@ def relations(log: Log, grid: Grid, *, quick: bool = False) -> list[Relation]:
 
 
 def _losses(
-    log: Log, grid: Grid, gyr: FloatArray, sensor: str, scales: list[float]
+    log: Log, grid: Grid, gyr: FloatArray, turning: Turning, sensor: str, scales: list[float]
 ) -> tuple[FloatArray, bool] | None:
     """Return how badly each hypothesis explains the turning, and whether its sign is among them.
 
@@ -96,7 +96,7 @@ def _losses(
     second half is for the opposite of the field. None where nothing is explained.
     """
     values = grid.fields[sensor]
-    evidence = turning(gyr, values, grid.dt, grid.bad, scales)
+    evidence = turning.evidence(sensor, scales)
     if evidence is None:
         return None
     loss = evidence.loss

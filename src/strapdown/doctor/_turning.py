@@ -7,10 +7,10 @@ that ``Q omega`` is the rate in the axes of `f`. For a rotation P, adding up ``P
 ``P R P'``, and for ``-P`` it gives ``P R_- P'`` with R_- from ``-omega``: two sums serve all 48.
 ``-f`` turns as `f` does, so this says nothing about the sign of the field itself.
 
-The gyroscope's unit is a further unknown: each hypothesis is asked at each of `scales`.
+The gyroscope's unit is a further unknown: each hypothesis is asked at several scales.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -88,77 +88,108 @@ def rest_bias(gyr: FloatArray, dt: float) -> FloatArray:
     return np.asarray(bias if spread < 0.6 * np.linalg.norm(bias) else np.zeros(3))
 
 
-def turning(
-    gyr: FloatArray,
-    field: FloatArray,
-    dt: float,
-    bad: BoolArray,
-    scales: Sequence[float],
-    spans: Sequence[float] = SPANS_S,
-) -> Evidence | None:
-    """Return how well each of the 48 hypotheses explains the turning of a field.
+class Turning:
+    """How the fields of a log turn, seen by its gyroscope; each scale is computed once.
 
     Parameters
     ----------
     gyr : ndarray, shape (n, 3)
         Angular rate, evenly spaced, its bias taken off, in the recorded unit.
-    field : ndarray, shape (n, 3)
-        Specific force or magnetic field at the same times, in any unit.
+    fields : mapping of str to ndarray, shape (n, 3)
+        Specific force and magnetic field at the same times, in any unit.
     dt : float
         Interval [s].
     bad : ndarray of bool, shape (n,)
         Where a sample cannot be used.
-    scales : sequence of float
-        Factors for the rate that are asked.
-    spans : sequence of float
-        Lengths of two neighbouring windows [s]; the one that decides best is returned.
-
-    Returns
-    -------
-    Evidence or None
-        None if there are fewer than three blocks of time.
     """
-    size = float(np.median(np.linalg.norm(field[~bad], axis=1))) if (~bad).any() else 0.0
-    if size == 0.0:
-        return None
-    unit_field = field / size
-    turns = [[_attitudes(sign * scale * dt * gyr) for sign in (1.0, -1.0)] for scale in scales]
-    found: Evidence | None = None
-    for span in spans:
-        evidence = _at_span(turns, unit_field, dt, bad, span)
-        if evidence is not None and (found is None or evidence.lead() > found.lead()):
-            found = evidence
-    return found
+
+    def __init__(
+        self, gyr: FloatArray, fields: Mapping[str, FloatArray], dt: float, bad: BoolArray
+    ) -> None:
+        self._gyr, self._dt = gyr, dt
+        self._windows = {
+            (name, span): windows
+            for name, field in fields.items()
+            for span in SPANS_S
+            if (windows := _windows_of(field, dt, bad, span)) is not None
+        }
+        self._residuals: dict[float, dict[tuple[str, float], FloatArray]] = {}
+
+    def evidence(self, field: str, scales: Sequence[float]) -> Evidence | None:
+        """Return how well each hypothesis explains the turning of a field.
+
+        Parameters
+        ----------
+        field : str
+            Which one.
+        scales : sequence of float
+            Factors for the rate that are asked.
+
+        Returns
+        -------
+        Evidence or None
+            Of the windows that decide best; None if there are too few.
+        """
+        found: Evidence | None = None
+        for span in SPANS_S:
+            windows = self._windows.get((field, span))
+            if windows is None:
+                continue
+            residual = np.stack([self._at(scale)[field, span] for scale in scales], axis=1)
+            typical = max(float(np.median(residual, axis=0).min()), _LEAST)
+            loss: FloatArray = np.log1p((residual / typical) ** 2)
+            seconds: FloatArray = np.flatnonzero(windows.pairs) * (0.5 * span)
+            evidence = Evidence(by_block(loss, seconds, len(self._gyr) * self._dt), typical)
+            if found is None or evidence.lead() > found.lead():
+                found = evidence
+        return found
+
+    def _at(self, scale: float) -> dict[tuple[str, float], FloatArray]:
+        """Return the residuals of all fields and windows at one scale, shape (pairs, 48)."""
+        if scale not in self._residuals:
+            dtheta = scale * self._dt * self._gyr
+            out = {key: np.empty((int(w.pairs.sum()), 48)) for key, w in self._windows.items()}
+            for sign in (1.0, -1.0):
+                R = _attitudes(sign * dtheta)
+                chosen = sign == DETERMINANTS
+                P = sign * SIGNED[chosen]
+                columns = P.transpose(0, 2, 1).reshape(-1, 9).T  # R_ij (P' f)_j
+                for key, windows in self._windows.items():
+                    turned = windows.changes(R) @ columns
+                    out[key][:, chosen] = np.sqrt((turned * turned).sum(axis=1))
+            self._residuals[scale] = out
+        return self._residuals[scale]
 
 
-def _at_span(
-    turns: list[list[FloatArray]], field: FloatArray, dt: float, bad: BoolArray, span: float
-) -> Evidence | None:
-    """Return the evidence of windows of one length."""
+@dataclass(frozen=True, slots=True, eq=False)
+class _Windows:
+    """A field in neighbouring windows, weighted, and the pairs that can be used."""
+
+    weighted: FloatArray
+    pairs: BoolArray
+
+    def changes(self, R: FloatArray) -> FloatArray:
+        """Return the changes of the means of R_ij f_l from window to window, (pairs, 3, 9)."""
+        count, h, _ = self.weighted.shape
+        rows = R[: count * h].reshape(count, h, 9).transpose(0, 2, 1)
+        mean = (rows @ self.weighted).reshape(count, 3, 9)
+        return np.asarray(np.diff(mean, axis=0)[self.pairs])
+
+
+def _windows_of(field: FloatArray, dt: float, bad: BoolArray, span: float) -> _Windows | None:
+    """Return the field's windows of half a span; None if there are too few of them."""
     h = round(0.5 * span / dt)
     count = len(field) // h if h >= 4 else 0
-    if count * h * dt < 3.0 * _BLOCK_S:
+    if count * h * dt < 3.0 * _BLOCK_S or bad.all():
+        return None
+    size = float(np.median(np.linalg.norm(field[~bad], axis=1)))
+    sound = np.logical_not(np.any(bad[: count * h].reshape(count, h), axis=1))
+    pairs = np.asarray(sound[1:] & sound[:-1])
+    if size == 0.0 or not pairs.any():
         return None
     window = np.sin(np.pi * (np.arange(h) + 0.5) / h) ** 2
-    weighted = (field[: count * h].reshape(count, h, 3)) * (window / window.sum())[:, None]
-    sound = np.logical_not(np.any(bad[: count * h].reshape(count, h), axis=1))
-    pairs = sound[1:] & sound[:-1]
-    if not pairs.any():
-        return None
-    residual = np.empty((int(pairs.sum()), len(turns), len(SIGNED)))
-    for k, both in enumerate(turns):
-        for sign, R in zip((1.0, -1.0), both, strict=True):
-            rows = R[: count * h].reshape(count, h, 9).transpose(0, 2, 1)
-            mean = (rows @ weighted).reshape(count, 3, 9)  # of R_ij f_l
-            change = np.diff(mean, axis=0)[pairs]
-            chosen = sign == DETERMINANTS
-            P = sign * SIGNED[chosen]
-            turned = change @ P.transpose(0, 2, 1).reshape(-1, 9).T  # R_ij (P' f)_j
-            residual[:, k, chosen] = np.sqrt((turned * turned).sum(axis=1))
-    typical = max(float(np.median(residual, axis=0).min()), _LEAST)
-    loss: FloatArray = np.log1p((residual / typical) ** 2)
-    seconds = np.flatnonzero(pairs) * h * dt
-    return Evidence(by_block(loss, np.asarray(seconds), len(field) * dt), typical)
+    window /= window.sum() * size
+    return _Windows(field[: count * h].reshape(count, h, 3) * window[:, None], pairs)
 
 
 def by_block(loss: FloatArray, seconds: FloatArray, duration: float) -> FloatArray:
@@ -236,11 +267,9 @@ def _product(a: FloatArray, b: FloatArray) -> FloatArray:
     """Return the Hamilton products of quaternions whose components come first."""
     aw, ax, ay, az = a
     bw, bx, by, bz = b
-    return np.stack(
-        (
-            aw * bw - ax * bx - ay * by - az * bz,
-            aw * bx + ax * bw + ay * bz - az * by,
-            aw * by - ax * bz + ay * bw + az * bx,
-            aw * bz + ax * by - ay * bx + az * bw,
-        )
-    )
+    out = np.empty(np.broadcast_shapes(a.shape, b.shape))
+    out[0] = aw * bw - ax * bx - ay * by - az * bz
+    out[1] = aw * bx + ax * bw + ay * bz - az * by
+    out[2] = aw * by - ax * bz + ay * bw + az * bx
+    out[3] = aw * bz + ax * by - ay * bx + az * bw
+    return out

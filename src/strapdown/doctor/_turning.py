@@ -138,7 +138,7 @@ class Turning:
             residual = np.stack([self._at(scale)[field, span] for scale in scales], axis=1)
             typical = max(float(np.median(residual, axis=0).min()), _LEAST)
             loss: FloatArray = np.log1p((residual / typical) ** 2)
-            seconds: FloatArray = np.flatnonzero(windows.pairs) * (0.5 * span)
+            seconds = np.asarray(np.flatnonzero(windows.pairs) * (0.5 * span), dtype=np.float64)
             evidence = Evidence(by_block(loss, seconds, len(self._gyr) * self._dt), typical)
             if found is None or evidence.lead() > found.lead():
                 found = evidence

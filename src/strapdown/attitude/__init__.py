@@ -4,6 +4,7 @@ from typing import Any
 
 from strapdown import estimator as _estimator
 from strapdown.attitude.heading import declination
+from strapdown.attitude.indirect_ekf import IndirectEkf
 from strapdown.attitude.integration import GyroIntegration
 from strapdown.attitude.madgwick import Madgwick
 from strapdown.attitude.mahony import Mahony
@@ -13,6 +14,7 @@ from strapdown.attitude.two_stage import TwoStage
 
 __all__ = [
     "GyroIntegration",
+    "IndirectEkf",
     "Madgwick",
     "Mahony",
     "Mekf",

@@ -71,23 +71,22 @@ def step(
             ey += mz * dx - mx * dz
             ez += mx * dy - my * dx
             note(w, D_MAG, mx - dx, my - dy, mz - dz, s.ACCEPTED)
-        norm2 = ex * ex + ey * ey + ez * ez
-        if norm2 > 0.0:  # (48): twice the unit vector is the rate of a unit quaternion rate
-            k = 2.0 / sqrt(norm2)
-            ex, ey, ez = k * ex, k * ey, k * ez
     elif has_mag:
         x[MAG] = 1.0  # waits for the accelerometer
     zeta_dt = p[P_ZETA] * dt
-    x[BG] -= zeta_dt * ex  # (50), (51)
-    x[BG + 1] -= zeta_dt * ey
-    x[BG + 2] -= zeta_dt * ez
-    beta = p[P_BETA]
-    advance_attitude(  # (25), (52), (46)-(48)
-        x,
-        (wx - x[BG] + beta * ex) * dt,
-        (wy - x[BG + 1] + beta * ey) * dt,
-        (wz - x[BG + 2] + beta * ez) * dt,
-    )
+    zeta_k, turn_k = 0.0, 0.0
+    norm2 = ex * ex + ey * ey + ez * ez
+    if norm2 > 0.0:  # (48): a unit quaternion rate is a rate of two
+        norm = sqrt(norm2)
+        turn_k = 2.0 * (p[P_BETA] + zeta_dt) * dt / norm  # the bias found here acts at once
+        zeta_k = 2.0 * zeta_dt / norm
+    rx = (wx - x[BG]) * dt + turn_k * ex  # (25), (52), (46)-(48)
+    ry = (wy - x[BG + 1]) * dt + turn_k * ey
+    rz = (wz - x[BG + 2]) * dt + turn_k * ez
+    advance_attitude(x, rx, ry, rz)
+    x[BG] -= zeta_k * ex  # (50), (51)
+    x[BG + 1] -= zeta_k * ey
+    x[BG + 2] -= zeta_k * ez
 
 
 # fmt: off

@@ -99,7 +99,7 @@ class NavigationTracker(Tracker):
         self._add(_checks.finite("t", t), _m.BARO, np.array([float(pressure)]))
 
     def update(
-        self, t: float, gyr: ArrayLike, acc: ArrayLike, mag: ArrayLike | None = None
+        self, t: float, gyr: ArrayLike, acc: ArrayLike | None, mag: ArrayLike | None = None
     ) -> None:
         """Feed one IMU sample.
 
@@ -109,8 +109,8 @@ class NavigationTracker(Tracker):
             Time [s], later than that of the sample before.
         gyr : array_like, shape (3,)
             Angular rate [rad/s].
-        acc : array_like, shape (3,)
-            Specific force [m/s^2].
+        acc : array_like, shape (3,), or None
+            Specific force [m/s^2]; None where a slower accelerometer has no new sample.
         mag : array_like, shape (3,), optional
             Not used by this filter.
 
@@ -125,7 +125,9 @@ class NavigationTracker(Tracker):
         sample = _Sample(
             t,
             _checks.as_vector("gyr", gyr, allow_nan=True).copy(),
-            _checks.as_vector("acc", acc, allow_nan=True).copy(),
+            np.full(3, np.inf)
+            if acc is None
+            else _checks.as_vector("acc", acc, allow_nan=True).copy(),
         )
         self._pending.sort(key=lambda item: item[0])
         while self._pending and self._pending[0][0] <= t:

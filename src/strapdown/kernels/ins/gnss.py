@@ -61,11 +61,11 @@ from strapdown.kernels.ins.layout import (
     RATE,
     RECOVER,
     RHO,
+    ROWS,
     S3,
     STRIDE,
     T_POS,
     T_VEL,
-    G,
     H,
     N,
     Q,
@@ -195,32 +195,37 @@ def velocity_row(x: Vec, p: Vec, w: Vec, i: int, age: float) -> float:
 
 
 @kernel
-def _row(x: Vec, p: Vec, w: Vec, kind: int, i: int, age: float) -> float:
-    """Set row i of position (0) or velocity (1)."""
-    if kind == 0:
-        return position_row(x, p, w, i, age)
-    return velocity_row(x, p, w, i, age)
+def _rows(x: Vec, p: Vec, w: Vec, kind: int, age: float) -> None:
+    """Write the three rows of position (0) or velocity (1) and their innovations."""
+    n = int(p[N])
+    for i in range(3):
+        y = 0.0
+        if kind == 1:
+            y = x[IN_V + i] - x[V + i] - velocity_row(x, p, w, i, age)
+        else:
+            if i == 0:
+                y = (x[IN_LLA] - x[LLA]) * x[R_N]
+            elif i == 1:
+                d = x[IN_LLA + 1] - x[LLA + 1]
+                d -= 2.0 * pi * float(int(d / (2.0 * pi)))
+                if d > pi:
+                    d -= 2.0 * pi
+                if d < -pi:
+                    d += 2.0 * pi
+                y = d * x[R_E]
+            else:
+                y = x[LLA + 2] - x[IN_LLA + 2]
+            y -= position_row(x, p, w, i, age)
+        w[D_POS + 3 * kind + i] = y
+        for k in range(n):
+            w[ROWS + i * STRIDE + k] = w[H + k]
 
 
 @kernel
-def _residual(x: Vec, p: Vec, w: Vec, kind: int, i: int, age: float) -> float:
-    """Set row i and return the innovation."""
-    expected = _row(x, p, w, kind, i, age)
-    seen: float = x[IN_V + i] - x[V + i]
-    if kind == 0:
-        if i == 0:
-            seen = (x[IN_LLA] - x[LLA]) * x[R_N]
-        elif i == 1:
-            d = x[IN_LLA + 1] - x[LLA + 1]
-            d -= 2.0 * pi * float(int(d / (2.0 * pi)))
-            if d > pi:
-                d -= 2.0 * pi
-            if d < -pi:
-                d += 2.0 * pi
-            seen = d * x[R_E]
-        else:
-            seen = x[LLA + 2] - x[IN_LLA + 2]
-    return seen - expected
+def _use_row(p: Vec, w: Vec, i: int) -> None:
+    """Make row i the measurement row."""
+    for k in range(int(p[N])):
+        w[H + k] = w[ROWS + i * STRIDE + k]
 
 
 @kernel
@@ -238,18 +243,14 @@ def _variance(x: Vec, p: Vec, kind: int, i: int) -> float:
 def _nis(x: Vec, P: Mat, p: Vec, w: Vec, kind: int, age: float) -> float:
     """Normalised innovation squared of the three axes; writes innovations and sigmas."""
     n = int(p[N])
+    _rows(x, p, w, kind, age)
     for i in range(3):
-        y = _residual(x, p, w, kind, i, age)
-        w[D_POS + 3 * kind + i] = y
+        _use_row(p, w, i)
         project(P, p, w)
-        for k in range(n):
-            w[G + i * STRIDE + k] = w[PH + k]
-    for i in range(3):
-        _row(x, p, w, kind, i, age)
-        for j in range(i + 1):
+        for j in range(3):
             s = 0.0
             for k in range(n):
-                s += w[H + k] * w[G + j * STRIDE + k]
+                s += w[ROWS + j * STRIDE + k] * w[PH + k]
             w[S3 + 3 * i + j] = s
         w[S3 + 3 * i + i] += _variance(x, p, kind, i)
         w[D_SPOS + 3 * kind + i] = sqrt(w[S3 + 3 * i + i])
@@ -267,11 +268,11 @@ def _nis(x: Vec, P: Mat, p: Vec, w: Vec, kind: int, age: float) -> float:
 
 
 @kernel
-def _take(x: Vec, P: Mat, p: Vec, w: Vec, kind: int, age: float) -> None:
+def _take(x: Vec, P: Mat, p: Vec, w: Vec, kind: int) -> None:
     """Absorb the three axes of position or velocity."""
     clear_correction(p, w)
     for i in range(3):
-        _row(x, p, w, kind, i, age)
+        _use_row(p, w, i)
         project(P, p, w)
         absorb(P, p, w, w[D_POS + 3 * kind + i], _variance(x, p, kind, i))
     inject(x, p, w)
@@ -324,7 +325,7 @@ def _velocity(x: Vec, P: Mat, p: Vec, w: Vec, age: float) -> None:
         P[PHI + 2, PHI + 2] += 0.25
     x[T_VEL] = x[T] if nis <= p[GATE] else x[T_VEL]
     w[D_OVEL] = float(ACCEPTED)
-    _take(x, P, p, w, 1, age)
+    _take(x, P, p, w, 1)
 
 
 @kernel
@@ -353,7 +354,7 @@ def _position(x: Vec, P: Mat, p: Vec, w: Vec, age: float) -> None:
     x[JUMPS] = 0.0
     x[T_POS] = x[T]
     w[D_OPOS] = float(ACCEPTED)
-    _take(x, P, p, w, 0, age)
+    _take(x, P, p, w, 0)
 
 
 @kernel

@@ -341,7 +341,30 @@ def step(
         r = p[P_ACC_RANGE]
         if abs(ax) >= r or abs(ay) >= r or abs(az) >= r:
             set_status(x, s.SATURATED)
-        _use(x, P, p, w, t, gx, gy, gz, ax, ay, az)
+        x[LAST_F], x[LAST_F + 1], x[LAST_F + 2] = ax, ay, az
+        dt = t - x[T]
+        if isnan(dt):  # the first sample
+            x[T] = t
+            x[A_FIX] = 0.0
+            x[FIX_T] = -inf
+            restart(x)
+        else:
+            x[T] = t
+            if dt > p[P_MAX_GAP]:
+                mind_gap(x, P, p, w, dt)
+                dt = 0.0
+            else:
+                new = feed_rest(x, p, dt, gx, gy, gz, ax, ay, az)
+                if x[MODE] > 0.0:
+                    advance(x, dt, gx, gy, gz, ax, ay, az)
+                else:
+                    if new and x[AT_REST] > 0.0:
+                        learn_bias(x)
+                    feed_alignment(x, dt, gx, gy, gz, ax, ay, az)
+            if x[MODE] > 0.0:
+                navigate(x, P, p, w, dt)
+            else:
+                align(x, P, p, w)
     if x[MODE] == 0.0:
         set_status(x, s.ALIGNING)
     elif x[T] - x[T_POS] > OUTAGE_AFTER:
@@ -350,40 +373,6 @@ def step(
         set_status(x, s.REST)
     if w[RECORD] < 2.0:
         publish(x, P, p)
-
-
-# fmt: off
-@kernel
-def _use(
-    x: Vec, P: Mat, p: Vec, w: Vec, t: float,
-    gx: float, gy: float, gz: float,
-    ax: float, ay: float, az: float,
-) -> None:
-    """Use a valid sample."""
-    # fmt: on
-    first = isnan(x[T])
-    x[LAST_F], x[LAST_F + 1], x[LAST_F + 2] = ax, ay, az
-    dt = t - x[T]
-    x[T] = t
-    if first:
-        x[A_FIX] = 0.0
-        x[FIX_T] = -inf
-        restart(x)
-        return
-    if dt > p[P_MAX_GAP]:
-        mind_gap(x, P, p, w, dt)
-        dt = 0.0
-    elif x[MODE] > 0.0:
-        feed_rest(x, p, dt, gx, gy, gz, ax, ay, az)
-        advance(x, dt, gx, gy, gz, ax, ay, az)
-    else:
-        if feed_rest(x, p, dt, gx, gy, gz, ax, ay, az) and x[AT_REST] > 0.0:
-            learn_bias(x)
-        feed_alignment(x, dt, gx, gy, gz, ax, ay, az)
-    if x[MODE] > 0.0:
-        navigate(x, P, p, w, dt)
-    else:
-        align(x, P, p, w)
 
 
 @kernel

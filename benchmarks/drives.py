@@ -1,0 +1,132 @@
+"""The loosely coupled filter on the road drives: outages, start, consistency, heading, speed.
+
+Usage: python benchmarks/drives.py [--turned] [--data FOLDER]
+
+`--turned` repeats the outages with the box turned about other axes, by rotating its raw data.
+"""
+
+import argparse
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+import strapdown as sd
+from strapdown.evaluation import mount_at
+from strapdown.evaluation.outages import outage_study
+from strapdown.navigation import LooselyCoupled
+from strapdown.navigation.loosely_coupled import STATES
+from strapdown.recording import Imu
+from strapdown.rotation import dcm_from_rotvec, quat_conj, quat_mul, rpy_from_quat
+from strapdown.solution import Outcome, Status
+
+DATA = Path(__file__).resolve().parents[2] / "shared" / "data" / "drives"
+TURNS_DEG = ((0, 0, 80), (0, 80, 0), (80, 0, 0), (180, 0, 0), (37, -120, 65))
+
+
+def error_table(drives, smooth):
+    """Print median and 95 % per length, together and for each drive."""
+    study = outage_study(drives, LooselyCoupled(), smooth=smooth)
+    print("\n" + ("smoothed, middle of the window" if smooth else "causal, end of the window"))
+    for row in study.summary():
+        print(
+            f"  {row['length_s']:3.0f} s  n {row['n']}  without solution {row['without_solution']}"
+            f"  median {row['median_m']:.2f} m  95 % {row['p95_m']:.2f} m"
+        )
+    for name, _ in drives:
+        cells = []
+        for length in (10.0, 30.0, 60.0):
+            of = [
+                w.horizontal_error_m
+                for w in study.windows
+                if w.drive == name and w.length_s == length
+            ]
+            cells.append(f"{np.median(of):5.2f} / {max(of):5.2f} ({len(of)})" if of else "-")
+        print(f"  {name:34s} median / largest (n)  " + "   ".join(cells))
+    if not smooth:
+        for s in study.starts:
+            print(f"  {s.drive:34s} navigates {s.first_solution_s - s.first_motion_s:5.1f} s "
+                  "after the first motion")  # fmt: skip
+
+
+def consistency(name, rec):
+    """Print innovations, heading and full-GNSS position of one drive."""
+    sol = LooselyCoupled().run(rec)
+    cells = []
+    for key in ("gnss_position", "gnss_velocity"):
+        rows = sol.diagnostics[key]
+        taken = rows.outcome == Outcome.ACCEPTED
+        nis = np.mean((rows.innovation[taken] / rows.sigma[taken]) ** 2)
+        share = 100 * taken.mean()
+        cells.append(f"{key[5:]} NIS per axis {nis:.2f}, {share:.1f} % taken")
+    errors = sd.evaluation.navigation_errors(sol, rec.reference)
+    attitude = rec.reference.attitude
+    k = np.clip(np.searchsorted(sol.t, attitude.t), 0, len(sol.t) - 1)
+    valid = np.ones(len(attitude), bool) if attitude.valid is None else attitude.valid
+    late = valid & ((sol.status[k] & Status.ALIGNING) == 0)
+    late &= attitude.t > attitude.t[np.argmax(valid)] + 60.0
+    q_nv = quat_mul(sol.q_nb[k], quat_conj(sol.q_vb[k]))
+    mount = mount_at(rec.reference.mount, attitude.t)
+    d = rpy_from_quat(q_nv) - rpy_from_quat(quat_mul(attitude.q_nb, quat_conj(mount)))
+    d = (d + np.pi) % (2 * np.pi) - np.pi
+    roll, pitch, yaw = np.degrees(np.std(d[late], axis=0))
+    rms = float(np.sqrt(np.mean(errors.horizontal**2)))
+    print(f"  {name:34s} {'; '.join(cells)}; roll, pitch, heading {roll:.2f} {pitch:.2f} "
+          f"{yaw:.2f} deg; horizontal {rms:.2f} m")  # fmt: skip
+
+
+def best(call, times=5):
+    """Least process time of a call [s]."""
+    call()
+    spent = []
+    for _ in range(times):
+        start = time.process_time()
+        call()
+        spent.append(time.process_time() - start)
+    return min(spent)
+
+
+def speed(rec):
+    """Print microseconds per IMU sample."""
+    n = len(rec.imu) / 1e6
+    plain = best(lambda: LooselyCoupled().run(rec)) / n
+    core = best(lambda: LooselyCoupled(states=()).run(rec)) / n
+    full = best(lambda: LooselyCoupled(states=STATES).run(rec)) / n
+    smooth = best(lambda: LooselyCoupled().smooth(rec), 3) / n
+    print(f"\nus per IMU sample: 15 states {core:.2f}, default {plain:.2f}, all states {full:.2f}, "
+          f"smoother {smooth:.2f} ({smooth / plain:.1f} times the filter)")  # fmt: skip
+
+
+def turned(rec, rotvec_deg):
+    """The recording of a box that is turned in the car."""
+    C = dcm_from_rotvec(np.radians(rotvec_deg))
+    imu = rec.imu
+    return replace(rec, imu=Imu(t=imu.t, gyr=imu.gyr @ C.T, acc=imu.acc @ C.T))
+
+
+def main():
+    """Run what the arguments ask for."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--data", type=Path, default=DATA)
+    parser.add_argument("--turned", action="store_true")
+    options = parser.parse_args()
+    drives = [(p.name, sd.read(p)) for p in sorted(options.data.iterdir()) if p.is_dir()]
+    error_table(drives, smooth=False)
+    error_table(drives, smooth=True)
+    print("\nfull GNSS (attitude: standard deviation a minute after the reference is valid)")
+    for name, rec in drives:
+        consistency(name, rec)
+    speed(max((rec for _, rec in drives), key=lambda rec: len(rec.imu)))
+    if options.turned:
+        for turn in TURNS_DEG:
+            study = outage_study([(n, turned(r, turn)) for n, r in drives], LooselyCoupled())
+            rows = "  ".join(
+                f"{r['length_s']:.0f} s {r['median_m']:.2f}/{r['p95_m']:.2f} m"
+                for r in study.summary()
+            )
+            print(f"box turned by {turn} deg: {rows}")
+
+
+if __name__ == "__main__":
+    main()

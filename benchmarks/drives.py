@@ -94,7 +94,7 @@ def speed(rec):
     core = best(lambda: LooselyCoupled(states=()).run(rec)) / n
     full = best(lambda: LooselyCoupled(states=STATES).run(rec)) / n
     smooth = best(lambda: LooselyCoupled().smooth(rec), 3) / n
-    print(f"\nus per IMU sample: 15 states {core:.2f}, default {plain:.2f}, all states {full:.2f}, "
+    print(f"\nus per IMU sample: 15 states {core:.2f}, default {plain:.2f}, all {full:.2f}, "
           f"smoother {smooth:.2f} ({smooth / plain:.1f} times the filter)")  # fmt: skip
 
 

@@ -137,10 +137,13 @@ def _scale(ask: _Ask, scales: list[float]) -> float:
     k = int(best.argmin())
     if k == 0 or best[0] - best[k] < DECIDED:
         return 1.0
-    first, second = np.partition(loss[:, k].sum(axis=0), 1)[:2]
+    total = loss[:, k].sum(axis=0)
+    first, second = np.partition(total, 1)[:2]
+    # A scale is believed with the axes as recorded, or with others that stand out.
+    believed = total[IDENTITY] - first < DECIDED or second - first >= 0.5 * DECIDED
     columns = np.stack([loss[:, i, int(loss[:, i].sum(axis=0).argmin())] for i in (k, 0)], axis=1)
     _, confidence = survivors(columns)
-    return scales[k] if confidence >= SURE and second - first >= 0.5 * DECIDED else 1.0
+    return scales[k] if confidence >= SURE and believed else 1.0
 
 
 def axes_findings(log: Log, found: Iterable[Relation]) -> list[Finding]:

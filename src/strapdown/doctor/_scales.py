@@ -210,7 +210,7 @@ def _finite(log: Log, sensor: str) -> FloatArray | None:
 
 
 def _norm(log: Log, sensor: str) -> tuple[float | None, float, float]:
-    """Return the norm in the calmest windows, its relative spread, and the mean vector's norm."""
+    """Return the norm in the calmest windows, its spread there, and the mean vector's norm."""
     values = _finite(log, sensor)
     if values is None:
         return None, 0.0, 0.0
@@ -222,9 +222,8 @@ def _norm(log: Log, sensor: str) -> tuple[float | None, float, float]:
     if len(norm) >= 20 * m and sensor == "acc":
         blocks = norm[: len(norm) // m * m].reshape(-1, m)
         noise = blocks.std(axis=1)
-        size = float(np.median(blocks.mean(axis=1)[noise <= np.quantile(noise, 0.3)]))
-    else:
-        size = float(np.median(norm))
+        norm = blocks[noise <= np.quantile(noise, 0.3)].ravel()
+    size = float(np.median(norm))
     quartiles = np.quantile(norm, (0.25, 0.75))
     mean = float(np.linalg.norm(values.mean(axis=0)))
     return size, float(quartiles[1] - quartiles[0]) / size, mean

@@ -83,7 +83,8 @@ def test_coefficients_of_thesis_a(channel):
         assert row["B"]["spread"] < 1.3 * cramer_rao(N, B, K)  # known to 7 % from 100 records
     for symbol, truth in (("B", B), ("K", K)):
         if truth:
-            assert row[symbol]["held"] >= 90
+            # Of 95 expected, three standard deviations of a count are 6.5; the goal is K's.
+            assert row[symbol]["held"] >= (90 if symbol == "K" else 87)
         else:  # the evidence asked for has a chance of 0.4 % where there is nothing
             assert row[symbol]["observed"] <= 3
     assert sum(c.R.observed for c in found) <= 1  # a random walk can look like a ramp

@@ -13,8 +13,9 @@ Both lead to the same kind of linear equations, iterated until their weights sta
 kept non-negative. Intervals, limits and the test whether a term is there at all come from the
 profile of the likelihood.
 
-A rate ramp is not noise: it is the mean of the differences of block means, taken in when the
-likelihood asks for it. A random walk hides a small one.
+A rate ramp is not noise: it is the mean of the differences of block means, taken in when it is
+beyond doubt; the likelihood is then the restricted one, of what a mean does not touch. A random
+walk hides a small ramp.
 
 A curve that no sum of the terms describes gets a relative model error, just large enough to
 explain the residuals; it takes weight from the short times.
@@ -45,7 +46,8 @@ _MAX_MODEL_ERROR = 3.0  # beyond it a curve has nothing to do with the terms
 _EVIDENCE: Final = 7.0  # gain of 2 log L that shows a term: chance 0.4 % where there is none
 _CONFIDENCE: Final = 0.95
 _ONE_SIDED: Final = float(chi2.ppf(2.0 * _CONFIDENCE - 1.0, 1))
-_RAMP_EVIDENCE: Final = float(chi2.ppf(0.9999, 1))  # a random walk makes ramps too
+_RAMP_SIGMAS: Final = 3.0  # that show a ramp
+_WALK: Final = TERMS.index("K")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -217,16 +219,20 @@ class _Problem:
 
     def seek_ramp(self) -> tuple[float, float]:
         """Return the ramp per sample and its deviation; let it in if it is beyond doubt."""
+        self.ramp = True
         theta = self.fit()
         self.freeze(theta)
-        without = self.loss(theta)
-        self.ramp = True
-        theta = self._iterate(theta, np.arange(len(TERMS)))
-        gain = without - self.loss(theta)
-        mean, std = self._mean_step(theta @ self.columns)
+        mean = self._mean_step(theta @ self.columns)[0]
+        # As unsure as the strongest random walk that could hide in what the ramp leaves.
+        walk = _crossing(
+            self, _WALK, theta, self.first_step(theta, _WALK), self.loss(theta) + _ONE_SIDED
+        )
+        if math.isfinite(walk):
+            theta = self.profile(_WALK, walk, theta)[1]
+        std = self._mean_step(theta @ self.columns)[1]
         self.frozen = None
         ramp = mean / self.block
-        self.ramp = gain > _RAMP_EVIDENCE
+        self.ramp = abs(mean) > _RAMP_SIGMAS * std
         if self.ramp:
             self.y = np.maximum(self.y - 0.5 * (ramp * self.factors) ** 2, 1e-3 * self.y)
         return ramp, std / self.block
@@ -270,6 +276,8 @@ class _Problem:
         steps = self._less_ramp(column)
         x, log_det = _toeplitz_solve(column, steps)[:2]
         fall = float(steps @ x) + log_det
+        if self.ramp:  # the likelihood of what is left when the mean is taken out
+            fall -= 2.0 * math.log(self._mean_step(column)[1])
         return fall + square - 2.0 * float(theta @ h) + float(theta @ M @ theta)
 
     def information(self, theta: FloatArray) -> FloatArray:
@@ -333,6 +341,11 @@ class _Problem:
         inverse, products = np.empty(x.size), np.empty(x.size)
         _k.inverse_diagonals(a, error, inverse)
         _k.lagged_products(x, products)
+        if self.ramp:
+            ones = _toeplitz_solve(column, np.ones(x.size))[0]
+            lost = np.empty(x.size)
+            _k.lagged_products(ones, lost)
+            inverse -= lost / ones.sum()
         gradient = 0.5 * (self.doubled @ (products - inverse))
         share = self.spectra / (theta @ self.spectra)
         F = 0.5 * share @ share.T  # the ring is twice as long, and its two halves are alike

@@ -5,6 +5,7 @@ References
 .. [1] Thesis A (three-axis platform), section 5.3: four hours, sensor at rest.
 """
 
+import itertools
 from typing import Final
 
 import numpy as np
@@ -104,7 +105,7 @@ def moving(y: FloatArray, fs: float) -> BoolArray:
     noisy[1:] |= stepped
     # A steady turn shows at its ends alone: short rests between two motions are none.
     hits = np.flatnonzero(noisy)
-    for first, last in zip(hits[:-1], hits[1:], strict=True):
+    for first, last in itertools.pairwise(hits):
         if last - first <= _SHORT_REST:
             noisy[first:last] = True
     moves[: count * width] = np.repeat(noisy, width)

@@ -38,9 +38,7 @@ def test_third_differences(x, m, width):
     n = x.size
     parts = x[: n - 3 * m], x[m : n - 2 * m], x[2 * m : n - m], x[3 * m :]
     d = parts[3] - 3.0 * parts[2] + 3.0 * parts[1] - parts[0]
-    assert_allclose(
-        k.third_difference_power(*parts, np.empty(width)), np.sum(d**2), rtol=1e-11
-    )
+    assert_allclose(k.third_difference_power(*parts, np.empty(width)), np.sum(d**2), rtol=1e-11)
 
 
 @pytest.mark.parametrize("m", [1, 2, 9, 70])

@@ -26,7 +26,8 @@ MATH_FUNCTIONS = {
 BUILTINS = {"abs", "bool", "float", "int", "max", "min"}
 SCALARS = {"bool", "float", "int"}
 ARRAYS = {"Vec": 1, "IntVec": 1, "Mat": 2}
-FROM_JIT = {"kernel", *ARRAYS}
+DECORATORS = ("kernel", "inlined_kernel")
+FROM_JIT = {*DECORATORS, *ARRAYS}
 OPERATORS = (
     ast.Add, ast.Sub, ast.Mult, ast.Div, ast.FloorDiv, ast.Mod, ast.Pow, ast.BitAnd, ast.BitOr,
     ast.BitXor, ast.LShift, ast.RShift, ast.USub, ast.UAdd, ast.Not, ast.Invert, ast.And, ast.Or,
@@ -127,7 +128,8 @@ class Checker:
     # --- functions --------------------------------------------------------------------
 
     def function(self, node):
-        if [ast.unparse(d) for d in node.decorator_list] != ["kernel"]:
+        decorators = [ast.unparse(d) for d in node.decorator_list]
+        if len(decorators) != 1 or decorators[0] not in DECORATORS:
             self.outside(node, f"{node.name} is not decorated with @kernel alone")
         a = node.args
         if a.posonlyargs or a.kwonlyargs or a.vararg or a.kwarg or a.defaults:

@@ -9,7 +9,7 @@ head of `x` is laid out here, the same for all; a filter's own states follow fro
 from math import atan2, cos, isinf, isnan, nan, sin, sqrt
 
 from strapdown.kernels import status as s
-from strapdown.kernels._jit import Mat, Vec, kernel
+from strapdown.kernels._jit import Mat, Vec, inlined_kernel, kernel
 from strapdown.kernels.quat import dcm, exp, from_acc, from_two_vectors, mul, normalize, rotate
 
 # --- head of x -------------------------------------------------------------------------
@@ -72,7 +72,7 @@ MIN_MAG2 = 1e-24  # (10^-12 T)^2
 MAX_MAG2 = 1e4  # (100 T)^2
 
 
-@kernel
+@inlined_kernel
 def load(x: Vec, t: float, j: int, t_mag: Vec, mag: Mat) -> int:
     """Put the latest field sample up to time `t` into the inbox; returns the next row."""
     while j < t_mag.shape[0] and t_mag[j] <= t:
@@ -110,7 +110,7 @@ def post(x: Vec, gyr: Vec, acc: Vec, mag: Vec) -> bool:
     return bool(mag.shape[0] == 0)
 
 
-@kernel
+@inlined_kernel
 def store(x: Vec, w: Vec, k: int, out: Mat, out_diag: Mat) -> None:
     """Write row `k` of the outputs; `out_diag` may be empty."""
     for i in range(out.shape[1]):
@@ -121,7 +121,7 @@ def store(x: Vec, w: Vec, k: int, out: Mat, out_diag: Mat) -> None:
 
 
 # fmt: off
-@kernel
+@inlined_kernel
 def field_in_body(
     w: float, x: float, y: float, z: float,
     mx: float, my: float, mz: float,
@@ -145,7 +145,7 @@ def field_in_body(
     )
 
 
-@kernel
+@inlined_kernel
 def advance_attitude(x: Vec, rx: float, ry: float, rz: float) -> None:
     """``q_nb <- q_nb exp(r_b)``."""
     qw, qx, qy, qz = x[Q], x[Q + 1], x[Q + 2], x[Q + 3]
@@ -199,7 +199,7 @@ def _level(x: Vec, ax: float, ay: float, az: float) -> None:
     x[Q], x[Q + 1], x[Q + 2], x[Q + 3] = normalize(w, a, b, c)
 
 
-@kernel
+@inlined_kernel
 def note(w: Vec, cell: int, ix: float, iy: float, iz: float, outcome: int) -> None:
     """Write an innovation without stated sigma into the diagnostics."""
     w[cell] = ix
@@ -212,7 +212,7 @@ def note(w: Vec, cell: int, ix: float, iy: float, iz: float, outcome: int) -> No
 
 
 # fmt: off
-@kernel
+@inlined_kernel
 def begin(
     x: Vec, p: Vec, w: Vec, t: float,
     gx: float, gy: float, gz: float,

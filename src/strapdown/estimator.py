@@ -98,13 +98,14 @@ class Tracker:
         Where to begin; knows nothing by default.
     """
 
-    __slots__ = ("_P", "_name", "_p", "_t", "_update", "_w", "_x")
+    __slots__ = ("_P", "_name", "_p", "_q", "_t", "_update", "_w", "_x")
 
     def __init__(self, estimator: "Estimator", state: State | None = None) -> None:
         state = estimator._own(estimator.init() if state is None else state)
         self._update, self._p, self._w = estimator._ready()
         self._name, self._x, self._P = state.name, state.x.copy(), state.P.copy()
         self._t = -math.inf if math.isnan(state.t) else state.t
+        self._q = self._x[_m.Q : _m.Q + 4]  # a view
 
     def update(
         self, t: float, gyr: ArrayLike, acc: ArrayLike | None, mag: ArrayLike | None = None
@@ -150,7 +151,7 @@ class Tracker:
     @property
     def q_nb(self) -> FloatArray:
         """Attitude, body to NED, shape (4,)."""
-        return self._x[_m.Q : _m.Q + 4].copy()
+        return self._q.copy()
 
     @property
     def gyr_bias(self) -> FloatArray:

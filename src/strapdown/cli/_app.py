@@ -22,6 +22,7 @@ from strapdown.cli import (
     filters,
     info,
     outages,
+    reproduce,
     run,
     simulate,
 )
@@ -43,6 +44,7 @@ app.command("filters")(filters.filters)
 app.command("characterize")(characterize.characterize)
 app.add_typer(calibrate.app, name="calibrate")
 app.command("simulate")(simulate.simulate)
+app.command("reproduce")(reproduce.reproduce)
 
 
 def _version(wanted: bool) -> None:

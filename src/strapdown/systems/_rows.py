@@ -169,6 +169,40 @@ def simulated(
     )  # fmt: skip
 
 
+def worded(
+    item: str,
+    thesis: str,
+    here: str,
+    *,
+    same: bool,
+    from_simulation: bool = False,
+    tolerance: str = "",
+    remark: str = "",
+) -> Row:
+    """Return a row whose statement is in words, such as ``out of tolerance``.
+
+    Parameters
+    ----------
+    item, remark, tolerance
+        See `Row`.
+    thesis, here : str
+        Both statements, with their figures and units.
+    same : bool
+        Whether they say the same.
+    from_simulation : bool
+        Whether `here` comes from simulated data: then recovered, not met.
+
+    Returns
+    -------
+    Row
+    """
+    agreed = Verdict.RECOVERED if from_simulation else Verdict.MET
+    return Row(
+        item=item, thesis=thesis, here=here, unit="", tolerance=tolerance,
+        verdict=agreed if same else Verdict.MISSED, remark=remark,
+    )  # fmt: skip
+
+
 def not_given(item: str, here: float | str | None, unit: str = "", remark: str = "") -> Row:
     """Return a row for what the thesis shows without a figure.
 

@@ -210,6 +210,18 @@ def test_own_parameters_are_checked(filter_name, name, bad, good):
         strapdown.estimators.create(filter_name, **{name: value}).run(REC)
 
 
+@pytest.mark.parametrize("alpha", [0.99, -1.0, math.nan])
+def test_step_of_madgwick_must_be_at_least_what_the_gyro_turns(alpha):
+    with pytest.raises(ValueError, match=r"`alpha` must lie in \[1, inf\], got"):
+        attitude.Madgwick(alpha=alpha)
+
+
+@pytest.mark.parametrize("dip", [1.6, -1.6, math.nan])
+def test_dip_must_be_that_of_a_field(dip):
+    with pytest.raises(ValueError, match=r"`dip` must lie in \[-1.5708, 1.5708\], got"):
+        attitude.Madgwick(dip=dip)
+
+
 def test_gyro_error_must_not_be_negative():
     with pytest.raises(ValueError, match="`gyr_error` must be non-negative"):
         attitude.Madgwick.from_gyro_error(-0.1)

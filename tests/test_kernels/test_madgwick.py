@@ -5,6 +5,7 @@ Equation numbers are those of the thesis, section 4.2, as cited in the kernel.
 
 import numpy as np
 import pytest
+import sympy as sp
 from scipy.spatial.transform import Rotation
 from truth.kernel_step import bias, feed, quat, rotation, scalar_first, start, unit
 from truth.rotations import hamilton, random_quats
@@ -110,6 +111,103 @@ def test_correction_is_steepest_descent_among_rotations():
         h = 1e-5
         grad = np.array([(cost(h * e) - cost(-h * e)) / (2 * h) for e in np.eye(3)])
         np.testing.assert_allclose(turned, -2.0 * DT * unit(grad), atol=1e-8)
+
+
+def test_fusion_before_the_simplification_follows_equations_37_to_42():
+    """Twin: the weighted mean of both quaternions as printed, taken along rotations.
+
+    Weighted means of steps and of rotations differ in the square of the step.
+    """
+    alpha, beta, zeta, dt = 3.0, 0.2, 0.05, 1e-4
+    flt = Madgwick(beta=beta, zeta=zeta, alpha=alpha)
+    b0 = np.array([0.02, -0.01, 0.03])
+    for k, (q, acc, mag) in enumerate(cases()):
+        rate = np.array([0.5, -0.8, 1.3]) * 0.1 ** (k % 3)
+        x, P = start(flt, q, b0)
+        feed(flt, x, P, dt, rate, acc, mag)
+        q_eps = direction(q, acc, mag)
+        w_b = b0 + zeta * 2.0 * hamilton(q * [1, -1, -1, -1], q_eps)[1:] * dt  # (50), (51)
+        q_dot = 0.5 * hamilton(q, [0.0, *(rate - w_b)])  # (25), (52)
+        mu = alpha * np.linalg.norm(q_dot) * dt  # (38)
+        q_grad = q - mu * q_eps  # (37)
+        weight = beta / (mu / dt + beta)  # (42)
+        want = unit(weight * q_grad + (1.0 - weight) * (q + q_dot * dt))  # (39)
+        step = quat(x) - q
+        # a step s of at most 1e-4 and its arc differ by s^2 / 3 of it
+        np.testing.assert_allclose(step, want - q, rtol=0, atol=1e-8 * np.linalg.norm(step))
+        np.testing.assert_allclose(bias(x), w_b, atol=1e-16)
+
+
+def test_large_alpha_is_the_simplified_filter_and_the_way_there_is_of_first_order():
+    """(44): the step that alpha leaves out is ``2 beta / (alpha |w|)`` of all."""
+    rate = np.array([0.5, -0.8, 1.3])
+    for q, acc, mag in cases():
+        ends = {}
+        for alpha in (np.inf, 1e3, 2e3, 1e14):
+            flt = Madgwick(beta=0.2, alpha=alpha)
+            x, P = start(flt, q)
+            feed(flt, x, P, DT, rate, acc, mag)
+            ends[alpha] = rotation(quat(x))
+        off = [(ends[np.inf].inv() * ends[a]).magnitude() for a in (1e3, 2e3, 1e14)]
+        assert off[0] / off[1] == pytest.approx(2.0, rel=1e-3)
+        assert off[2] < 1e-15
+
+
+def test_weighted_filter_stands_still_without_a_rate_and_integrates_without_vectors():
+    """(38) makes no step where nothing turns, and with nothing to weigh (40) holds."""
+    q = random_quats(1, seed=5)[0]
+    flt = Madgwick(beta=0.2, alpha=2.0)
+    x, P = start(flt, q)
+    feed(flt, x, P, DT, np.zeros(3), [1.0, 2.0, -9.0], [2e-5, 1e-5, 3e-5])
+    np.testing.assert_allclose(quat(x), q, rtol=0, atol=1e-15)
+    rate = np.array([0.5, -0.8, 1.3])
+    feed(flt, x, P, 2 * DT, rate, np.full(3, np.inf))
+    want = rotation(q) * Rotation.from_rotvec(rate * DT)
+    assert (rotation(quat(x)) * want.inv()).magnitude() < 1e-15
+
+
+@pytest.mark.parametrize("declination", [None, -0.3])
+def test_preset_field_takes_the_place_of_the_measured_dip(declination):
+    """Without (49): the reference stands still, and its error turns roll and pitch as well."""
+    flt = Madgwick(beta=0.3, dip=1.1, declination=declination)
+    d = declination or 0.0
+    b = np.array([np.cos(1.1) * np.cos(d), np.cos(1.1) * np.sin(d), np.sin(1.1)])
+    for q, acc, mag in cases():
+        x, P = start(flt, q)
+        w = feed(flt, x, P, DT, np.zeros(3), acc, mag)
+        grad = jacobian(q, [0, 0, 1]).T @ objective(q, [0, 0, 1], -unit(acc))
+        grad = grad + jacobian(q, b).T @ objective(q, b, unit(mag))
+        q_eps = unit(grad - (grad @ q) * q)
+        want = np.cos(0.3 * DT) * q - np.sin(0.3 * DT) * q_eps
+        np.testing.assert_allclose(quat(x), want, rtol=0, atol=1e-14)
+        seen = unit(mag) - rotation(q).inv().apply(b)
+        np.testing.assert_allclose(w[m.D_MAG : m.D_MAG + 3], seen, atol=1e-15)
+
+
+def test_printed_gradient_agrees_with_a_symbolic_derivation():
+    """SymPy differentiates ``q* o d o q - s`` itself; on unit quaternions (30) is the same."""
+    q = sp.symbols("q1:5")
+    d = sp.symbols("dx dy dz")
+
+    def product(a, b):
+        return [
+            a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3],
+            a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
+            a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1],
+            a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0],
+        ]
+
+    turned = product(product([q[0], -q[1], -q[2], -q[3]], [0, *d]), q)[1:]
+    exact = sp.lambdify((q, d), sp.Matrix(turned).jacobian(q))
+    for quat_, _, mag in cases():
+        b = unit(mag)
+        # (29) uses |q| = 1, so both derivatives agree along rotations only
+        across = np.eye(4) - np.outer(quat_, quat_)
+        np.testing.assert_allclose(
+            np.array(exact(quat_, b), dtype=float) @ across,
+            jacobian(quat_, b) @ across,
+            atol=1e-14,
+        )
 
 
 def test_gyro_bias_follows_equations_50_to_52():

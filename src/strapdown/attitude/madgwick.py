@@ -8,6 +8,7 @@ from strapdown import _checks
 from strapdown._types import FloatArray
 from strapdown.attitude._base import AttitudeEstimator
 from strapdown.estimator import register
+from strapdown.kernels import memory as _m
 
 
 @register(
@@ -23,8 +24,7 @@ class Madgwick(AttitudeEstimator):
     State: q_nb and, with `zeta`, the gyro bias. Each sample turns the attitude with the
     compensated rate and against the normalised gradient of the squared difference between
     predicted and measured directions of gravity and field: equations (25), (28)-(36) and
-    (46)-(52) of the thesis, misprints corrected. The field's reference is rebuilt from the
-    measured dip at every sample (49), so that disturbances reach the heading only.
+    (46)-(52) of the thesis, misprints corrected.
 
     Parameters
     ----------
@@ -35,9 +35,22 @@ class Madgwick(AttitudeEstimator):
     zeta : float
         Rate at which the gyro bias follows the correction [rad/s^2]. Zero switches bias
         estimation off. It winds up in a long initial transient.
+    alpha : float
+        Size of the step down the gradient in multiples of what the gyro turns, at least 1:
+        the filter before its simplification, (37)-(42). Infinite gives the simplified one.
+        Smaller holds the attitude back where the rate is small against ``2 beta / alpha``.
+    dip : float, optional
+        Dip of the field, positive down [rad], where its reference is to be preset. None
+        rebuilds the reference from what is measured at every sample (49), so that
+        disturbances reach the heading only.
 
     Notes
     -----
+    The step down the gradient, ``mu = alpha |dq/dt| dt`` (38), has the weight ``lambda = beta
+    / (mu / dt + beta)`` (42) against the integrated rate. Put into (39), all of the simplified
+    step, rate and correction, is taken times ``mu / (mu + beta dt)``. At rest mu vanishes, and
+    with it all corrections: only noise of the gyro lets such a filter converge.
+
     Online. The gradient is normalised: the attitude chatters by about ``beta dt``, and the
     correction slews at a rate that does not depend on the size of the error.
 
@@ -58,12 +71,17 @@ class Madgwick(AttitudeEstimator):
     NAME: ClassVar[str] = "madgwick"
     beta: float = 0.0756
     zeta: float = 0.0
+    alpha: float = math.inf
+    dip: float | None = None
 
     def __post_init__(self) -> None:
         """Check the parameters."""
         AttitudeEstimator.__post_init__(self)
         _checks.positive("beta", self.beta, allow_zero=True)
         _checks.positive("zeta", self.zeta, allow_zero=True)
+        _checks.in_range("alpha", self.alpha, 1.0, math.inf)
+        if self.dip is not None:
+            _checks.in_range("dip", self.dip, -0.5 * math.pi, 0.5 * math.pi)
 
     @classmethod
     def from_gyro_error(
@@ -100,4 +118,14 @@ class Madgwick(AttitudeEstimator):
         p = self._common(kernel.P_SIZE)
         p[kernel.P_BETA] = self.beta
         p[kernel.P_ZETA] = self.zeta
+        p[kernel.P_SLOW] = 2.0 * self.beta / self.alpha
+        p[kernel.P_FIELD] = math.nan
+        if self.dip is not None:
+            north, east = p[_m.P_COS_D], p[_m.P_SIN_D]
+            across = math.cos(self.dip)
+            p[kernel.P_FIELD : kernel.P_FIELD + 3] = (
+                across * north,
+                across * east,
+                math.sin(self.dip),
+            )
         return p

@@ -5,9 +5,13 @@ otherwise here. n is NED, so the measured direction of gravity is ``-f_b / |f_b|
 gradient (28) is taken along rotations only: its component along the quaternion itself changes
 no attitude, but depends on how (29) is written and spoils the normalisation (48). What is left
 of ``J^T f`` is the cross product of measured and predicted direction, times q.
+
+The fusion (39) of a step ``mu`` down the gradient with the integrated rate, weighted by (42),
+is the simplified step (46) times ``mu / (mu + beta dt)``: both filters are one here. That
+factor is one where ``mu`` is infinite.
 """
 
-from math import inf, sqrt
+from math import inf, isnan, sqrt
 
 from strapdown.kernels import status as s
 from strapdown.kernels._jit import Mat, Vec, kernel
@@ -31,11 +35,13 @@ from strapdown.kernels.memory import (
     post,
     store,
 )
-from strapdown.kernels.quat import down_in_body
+from strapdown.kernels.quat import down_in_body, rotate_inverse
 
 P_BETA = P_HEAD  # [rad/s]
 P_ZETA = P_HEAD + 1  # [rad/s^2]
-P_SIZE = P_HEAD + 2
+P_SLOW = P_HEAD + 2  # rate at which half of the step is left [rad/s]; 0: simplified filter
+P_FIELD = P_HEAD + 3  # direction of the field in n: 3; NaN: rebuilt from what is measured
+P_SIZE = P_HEAD + 6
 W_SIZE = W_HEAD
 
 
@@ -66,7 +72,11 @@ def step(
             mx, my, mz = x[MAG + 1], x[MAG + 2], x[MAG + 3]
             k = 1.0 / sqrt(mx * mx + my * my + mz * mz)
             mx, my, mz = k * mx, k * my, k * mz
-            dx, dy, dz = field_in_body(qw, qx, qy, qz, mx, my, mz, p[P_COS_D], p[P_SIN_D])  # (49)
+            if isnan(p[P_FIELD]):  # (49)
+                dx, dy, dz = field_in_body(qw, qx, qy, qz, mx, my, mz, p[P_COS_D], p[P_SIN_D])
+            else:
+                bn, be, bd = p[P_FIELD], p[P_FIELD + 1], p[P_FIELD + 2]
+                dx, dy, dz = rotate_inverse(qw, qx, qy, qz, bn, be, bd)
             ex += my * dz - mz * dy
             ey += mz * dx - mx * dz
             ez += mx * dy - my * dx
@@ -83,6 +93,13 @@ def step(
     rx = (wx - x[BG]) * dt + turn_k * ex  # (25), (52), (46)-(48)
     ry = (wy - x[BG + 1]) * dt + turn_k * ey
     rz = (wz - x[BG + 2]) * dt + turn_k * ez
+    if p[P_SLOW] > 0.0 and has_acc:  # (37)-(42), mu dt^-1 = alpha |w| / 2
+        wx = wx - x[BG] + zeta_k * ex
+        wy = wy - x[BG + 1] + zeta_k * ey
+        wz = wz - x[BG + 2] + zeta_k * ez
+        rate = sqrt(wx * wx + wy * wy + wz * wz)
+        share = rate / (rate + p[P_SLOW])
+        rx, ry, rz = share * rx, share * ry, share * rz
     advance_attitude(x, rx, ry, rz)
     x[BG] -= zeta_k * ex  # (50), (51)
     x[BG + 1] -= zeta_k * ey

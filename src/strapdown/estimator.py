@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields
 from importlib import import_module
 from types import ModuleType
-from typing import Any, ClassVar, NamedTuple, Protocol, TypeVar
+from typing import Any, ClassVar, NamedTuple, Protocol, Self, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -173,6 +173,35 @@ class KernelModule(Protocol):
     update: Any
 
 
+class Taken(NamedTuple):
+    """How a parameter follows from the noise of a sensor: ``factor * quantity``.
+
+    Attributes
+    ----------
+    parameter : str
+        Of the estimator.
+    quantity : str
+        Of `strapdown.sensors.NoiseParameters`.
+    factor : float
+        From the quantity to the parameter.
+    floor : bool
+        The parameter stands for motion, vibration or the room besides the sensor's own noise:
+        the default stays where it is the larger.
+    """
+
+    parameter: str
+    quantity: str
+    factor: float = 1.0
+    floor: bool = False
+
+
+class Noisy(Protocol):
+    """What knows the noise of a sensor: a device of `sensors`, a record of `noise`."""
+
+    def noise_parameters(self) -> Any:
+        """Return `strapdown.sensors.NoiseParameters`."""
+
+
 class Estimator:
     """Base of all estimators: a frozen dataclass of parameters with pure methods.
 
@@ -185,6 +214,36 @@ class Estimator:
     _sizes: tuple[tuple[int, ...], tuple[int, ...]]
     NAME: ClassVar[str]
     OUTPUTS: ClassVar[tuple[str, ...]] = ("q_nb", "gyr_bias")
+    FROM_SENSOR: ClassVar[tuple[Taken, ...]] = ()
+
+    @classmethod
+    def from_sensor(cls, sensor: Noisy, **parameters: Any) -> Self:
+        """Return the estimator with the noise of a sensor for its noise parameters.
+
+        Which parameters those are stands in ``FROM_SENSOR``. A noise that the sensor does not
+        state leaves the default. A parameter that also stands for motion, vibration or a
+        disturbed field is never below its default: a datasheet knows the sensor lying still.
+
+        Parameters
+        ----------
+        sensor : Device or NoiseRecord
+            ``strapdown.sensors.preset("mpu6050")``, or ``strapdown.noise.load("noise.toml")``.
+        **parameters
+            Fields of its dataclass, which win.
+
+        Returns
+        -------
+        Estimator
+
+        Raises
+        ------
+        ValueError
+            If the estimator has no noise parameter, or the sensor states none of its noises.
+        TypeError
+            If `sensor` is neither a device nor a noise record.
+        """
+        values = _from_sensor(cls, sensor)
+        return cls(**{**values, **parameters})
 
     @staticmethod
     def _kernel() -> Any:
@@ -423,9 +482,37 @@ class Estimator:
             causal=True,
             heading_reference=self._heading_reference(rec),
             diagnostics=rows,
-            meta={"parameters": self.parameters()},
+            meta={"parameters": self.parameters(), **kept_facts(rec)},
             **arrays,
         )
+
+
+def _from_sensor(cls: type[Estimator], sensor: Noisy) -> dict[str, float]:
+    """Return the parameters that a sensor's noise gives."""
+    if not cls.FROM_SENSOR:
+        raise ValueError(
+            f"{cls.NAME} has no noise parameter that a sensor could fill; set its gains, or take "
+            f"one of {', '.join(e.name for e in entries() if e.cls.FROM_SENSOR)}."
+        )
+    if not hasattr(sensor, "noise_parameters"):
+        raise TypeError(
+            "`sensor` must be a device such as strapdown.sensors.preset('mpu6050'), or a noise "
+            f"record such as strapdown.noise.load('noise.toml'), got {sensor!r}."
+        )
+    noise = sensor.noise_parameters()
+    defaults = {f.name: f.default for f in fields(cls)}  # type: ignore[arg-type]
+    values: dict[str, float] = {}
+    for parameter, quantity, factor, floor in cls.FROM_SENSOR:
+        value = factor * getattr(noise, quantity)
+        if not math.isnan(value):
+            values[parameter] = max(value, defaults[parameter]) if floor else value
+    if not values:
+        asked = ", ".join(taken.quantity for taken in cls.FROM_SENSOR)
+        raise ValueError(
+            f"`sensor` must state a noise that {cls.NAME} takes ({asked}), got "
+            f"{getattr(sensor, 'name', type(sensor).__name__)}, which states none of them."
+        )
+    return values
 
 
 def _as_kernel_input(
@@ -448,6 +535,21 @@ def _wrong_lengths(*vectors: Any) -> ValueError:
     """Return the error for vectors that have not three components."""
     shapes = ", ".join(str(np.shape(v)) for v in vectors)
     return ValueError(f"`gyr`, `acc` and `mag` must have shape (3,), got {shapes}.")
+
+
+def kept_facts(rec: Recording) -> dict[str, Any]:
+    """Return what a solution keeps of its recording's metadata: when ``t = 0`` was.
+
+    Parameters
+    ----------
+    rec : Recording
+        What was estimated from.
+
+    Returns
+    -------
+    dict
+    """
+    return {key: rec.meta[key] for key in ("epoch_utc",) if rec.meta.get(key)}
 
 
 _INBOX: Mapping[str, tuple[int, int]] = {

@@ -10,7 +10,7 @@ from strapdown import _checks
 from strapdown._types import FloatArray
 from strapdown.attitude._base import AttitudeEstimator
 from strapdown.constants import G0
-from strapdown.estimator import register
+from strapdown.estimator import Taken, register
 from strapdown.kernels import memory as _m
 from strapdown.recording import Recording
 from strapdown.solution import Solution
@@ -92,6 +92,13 @@ class IndirectEkf(AttitudeEstimator):
 
     NAME: ClassVar[str] = "indirect-ekf"
     OUTPUTS: ClassVar[tuple[str, ...]] = ("q_nb", "gyr_bias", "std_attitude_n", "std_gyr_bias")
+    FROM_SENSOR: ClassVar[tuple[Taken, ...]] = (
+        Taken("gyr_noise", "gyr_noise"),
+        Taken("gyr_bias_noise", "gyr_bias_walk"),
+        Taken("acc_noise", "acc_noise", floor=True),
+        Taken("mag_noise", "mag_noise"),
+        Taken("std_gyr_bias", "gyr_bias_std"),
+    )
     gyr_noise: float = 8.2e-3 * DEG
     gyr_bias_noise: float = 1.1e-4 * DEG
     acc_noise: float = 1.0

@@ -10,7 +10,7 @@ from strapdown import _checks
 from strapdown._types import FloatArray
 from strapdown.attitude._base import AttitudeEstimator
 from strapdown.constants import G0
-from strapdown.estimator import register
+from strapdown.estimator import Taken, register
 from strapdown.kernels import memory as _m
 from strapdown.units import DEG
 
@@ -74,6 +74,12 @@ class Mekf(AttitudeEstimator):
 
     NAME: ClassVar[str] = "mekf"
     OUTPUTS: ClassVar[tuple[str, ...]] = ("q_nb", "gyr_bias", "std_attitude_n", "std_gyr_bias")
+    FROM_SENSOR: ClassVar[tuple[Taken, ...]] = (
+        Taken("gyr_noise", "gyr_noise"),
+        Taken("gyr_bias_noise", "gyr_bias_walk"),
+        Taken("acc_noise", "acc_noise", floor=True),
+        Taken("std_gyr_bias", "gyr_bias_std"),
+    )
     gyr_noise: float = 3e-4
     gyr_bias_noise: float = 3e-5
     acc_noise: float = 1.5

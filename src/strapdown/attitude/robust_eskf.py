@@ -9,7 +9,7 @@ from strapdown import _checks
 from strapdown._types import FloatArray
 from strapdown.attitude._base import AttitudeEstimator
 from strapdown.constants import G0
-from strapdown.estimator import register
+from strapdown.estimator import Taken, register
 from strapdown.kernels import memory as _m
 from strapdown.recording import Recording
 from strapdown.solution import Solution
@@ -125,6 +125,13 @@ class RobustEskf(AttitudeEstimator):
 
     NAME: ClassVar[str] = "robust-eskf"
     OUTPUTS: ClassVar[tuple[str, ...]] = ("q_nb", "gyr_bias", "std_attitude_n", "std_gyr_bias")
+    FROM_SENSOR: ClassVar[tuple[Taken, ...]] = (
+        Taken("gyr_noise", "gyr_noise", floor=True),
+        Taken("gyr_bias_walk", "gyr_bias_walk", floor=True),
+        Taken("gyr_bias_std", "gyr_bias_std"),
+        Taken("acc_noise", "acc_noise", floor=True),
+        Taken("acc_bias_std", "acc_bias_std"),
+    )
     gyr_noise: float = 1.5e-3
     gyr_rate_noise: float = 5e-4
     gyr_bias_walk: float = 3e-5

@@ -9,7 +9,8 @@ import numpy as np
 from strapdown import _checks
 from strapdown._types import FloatArray
 from strapdown.attitude._base import AttitudeEstimator
-from strapdown.estimator import register
+from strapdown.constants import G0
+from strapdown.estimator import Taken, register
 from strapdown.kernels import memory as _m
 
 Linearisation = Literal["sequential", "printed"]
@@ -76,6 +77,10 @@ class TwoStage(AttitudeEstimator):
 
     NAME: ClassVar[str] = "two-stage"
     OUTPUTS: ClassVar[tuple[str, ...]] = ("q_nb",)
+    FROM_SENSOR: ClassVar[tuple[Taken, ...]] = (
+        Taken("process_noise", "gyr_noise", 0.5, floor=True),
+        Taken("acc_noise", "acc_noise", 1.0 / G0, floor=True),
+    )
     process_noise: float = 0.01
     acc_noise: float = math.sqrt(2.0 * 0.01)
     mag_noise: float = math.sqrt(1.0 * 0.01)

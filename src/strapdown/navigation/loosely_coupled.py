@@ -8,7 +8,7 @@ import numpy as np
 
 from strapdown import _checks
 from strapdown._types import FloatArray
-from strapdown.estimator import CELLS, Estimator, State, Tracker, register
+from strapdown.estimator import CELLS, Estimator, State, Taken, Tracker, register
 from strapdown.kernels import memory as _m
 from strapdown.kernels import status as _s
 from strapdown.recording import Recording
@@ -164,6 +164,14 @@ class LooselyCoupled(Estimator):
         "acc_bias",
         "std_acc_bias",
         "q_vb",
+    )
+    FROM_SENSOR: ClassVar[tuple[Taken, ...]] = (
+        Taken("gyr_noise", "gyr_noise", floor=True),
+        Taken("acc_noise", "acc_noise", floor=True),
+        Taken("gyr_bias_walk", "gyr_bias_walk", floor=True),
+        Taken("acc_bias_walk", "acc_bias_walk", floor=True),
+        Taken("std_gyr_bias", "gyr_bias_std"),
+        Taken("std_acc_bias", "acc_bias_std"),
     )
     states: tuple[str, ...] = (
         "mount",

@@ -12,6 +12,7 @@ from strapdown._checks import as_matrices, one_of, positive
 from strapdown._types import FloatArray
 from strapdown.errors import InputError, MissingStream
 from strapdown.noise.coefficients import Coefficient, Coefficients, Status
+from strapdown.sensors import NoiseParameters
 
 AXES: Final = ("x", "y", "z")
 # Name of the SI unit of each sensor in `strapdown.units`, and its symbol.
@@ -191,6 +192,24 @@ class NoiseRecord:
             values[f"{name}_bias_noise"] = _combined(walk, axis)
             values[f"{name}_std"] = _combined([a.std for _, a in chosen], axis)
         return FilterNoise(**values, notes=tuple(notes))
+
+    def noise_parameters(self) -> NoiseParameters:
+        """Return what was observed, the largest of the axes, as ``from_sensor`` takes it.
+
+        Returns
+        -------
+        NoiseParameters
+            NaN for what is not observable on an axis, so that an estimator keeps its default;
+            the limits that the record sets are in `filter_noise`.
+        """
+        names = {"N": "noise", "K": "bias_walk", "B": "bias_instability"}
+        values: dict[str, float] = {}
+        for sensor, noise in self.sensors.items():
+            for symbol, name in names.items():
+                found = [axis.coefficients[symbol] for axis in noise.axes]
+                if all(c.status is not Status.NOT_OBSERVABLE for c in found):
+                    values[f"{sensor}_{name}"] = max(c.value for c in found)
+        return NoiseParameters(**values)
 
 
 def _white(sensor: str, letter: str, c: Coefficient, notes: list[str]) -> float:

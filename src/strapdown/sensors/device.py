@@ -55,6 +55,10 @@ class NoiseParameters:
     acc_bias_std: float = math.nan
     mag_bias_std: float = math.nan
 
+    def noise_parameters(self) -> "NoiseParameters":
+        """Return itself: what a device and a noise record make, an estimator takes as well."""
+        return self
+
     def known(self, *names: str, **renamed: str) -> dict[str, float]:
         """Return the known ones of some parameters, as arguments of an estimator.
 

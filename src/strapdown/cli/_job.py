@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from strapdown import __version__
-from strapdown.cli import _console, _errors, _output, _settings, doctor
+from strapdown.cli import _console, _errors, _output, _sensor, _settings, doctor
 from strapdown.errors import DataGap, InputError
 
 if TYPE_CHECKING:
@@ -28,6 +28,8 @@ class Job:
         Registry name; a sensible one for the recording's streams by default.
     settings : sequence of str
         Parameters of the estimator as ``key=value``.
+    sensor : str, optional
+        Preset or noise file that fills the noise parameters.
     calibration : path, optional
         Calibration file to apply first.
     smooth : bool
@@ -41,6 +43,7 @@ class Job:
     folder: Path
     filter: str | None = None
     settings: Sequence[str] = ()
+    sensor: str | None = None
     calibration: Path | None = None
     smooth: bool = False
     report: bool = True
@@ -60,7 +63,9 @@ def do(job: Job, log: str, read: Callable[[], "Recording"]) -> None:
         Returns the recording.
     """
     if job.filter is not None:  # a misspelt option is found before a long log is read
-        _estimator(job.filter, job.settings)
+        _estimator(job.filter, job)
+    elif job.sensor is not None:
+        _sensor.named(job.sensor)
     with _console.progress(3 + job.report) as progress, _output.made_aside(job.folder) as aside:
         progress.step(f"reading {log}")
         begun = time.perf_counter()
@@ -120,13 +125,17 @@ def _results(
     }
 
 
-def _estimator(name: str, settings: Sequence[str]) -> Any:
-    """Return the estimator `name` with its parameters as typed."""
+def _estimator(name: str, job: Job) -> Any:
+    """Return the estimator `name` with its sensor's noise, and its parameters as typed."""
     from strapdown import estimator as estimators
 
     with _errors.given("--filter"):
         cls = estimators.entry(name).cls
-    given = _settings.parameters(name, cls, settings)
+    given = _settings.parameters(name, cls, job.settings)
+    if job.sensor is not None:
+        sensor = _sensor.named(job.sensor)
+        with _errors.given(f"--sensor {job.sensor}"):
+            return cls.from_sensor(sensor, **given)
     with _errors.given(f"--set {_settings.mapping_text(given)}"):
         return estimators.create(name, **given)
 
@@ -143,7 +152,7 @@ def _solution(
 
     with _errors.given(log):
         name = job.filter or estimators.preferred(rec)
-    flt = _to_true_north(_estimator(name, job.settings), rec, progress)
+    flt = _to_true_north(_estimator(name, job), rec, progress)
     if job.smooth and not hasattr(flt, "smooth"):
         raise InputError(f"{name} has no offline twin; leave --smooth out, or choose another.")
     progress.step(f"estimating with {name}")

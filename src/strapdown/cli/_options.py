@@ -22,6 +22,14 @@ Set = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="KEY=VALUE", help="A parameter of the estimator; repeatable."),
 ]
+Sensor = Annotated[
+    str | None,
+    typer.Option(
+        "--sensor",
+        metavar="PRESET|FILE",
+        help="Its noise goes to the estimator: mpu6050, or the noise.toml of `characterize`.",
+    ),
+]
 Calibration = Annotated[
     Path | None, typer.Option("--calibration", metavar="FILE", help="Calibration to apply first.")
 ]

@@ -8,6 +8,7 @@ def run(
     source: _options.Source,
     filter: _options.Filter = None,
     set_: _options.Set = None,
+    sensor: _options.Sensor = None,
     calibration: _options.Calibration = None,
     smooth: _options.Smooth = False,
     folder: _options.Folder = None,
@@ -22,6 +23,7 @@ def run(
     job = _job.Job(
         filter=filter,
         settings=tuple(set_ or ()),
+        sensor=sensor,
         calibration=calibration,
         smooth=smooth,
         folder=folder or _output.default_folder(source.main),

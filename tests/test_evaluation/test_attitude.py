@@ -262,6 +262,35 @@ def test_roll_pitch_yaw_are_the_vehicles_where_the_mount_is_known():
     assert alone.total == pytest.approx(errors.total, abs=0)  # a mount turns both alike
 
 
+def test_where_both_know_a_mount_the_vehicles_attitudes_are_compared():
+    n = 30
+    q_nv = wandering(n)
+    own = Rotation.from_euler("ZYX", [1.3, 80 * DEG, np.pi])
+    stated = Rotation.from_euler("Z", 25 * DEG) * own  # the reference's mount is wrong
+    off = Rotation.from_rotvec([0.0, 0.0, 0.7 * DEG])
+    found = np.arange(n) >= 10
+    q_vb = quats(Rotation.concatenate([own] * n))
+    q_vb[~found] = [1.0, 0.0, 0.0, 0.0]  # as before the mount is found
+    errors = attitude_errors(
+        solution(clock(n), off * q_nv * own, q_vb=q_vb, std_attitude_n=np.ones((n, 3))),
+        Reference(
+            attitude=AttitudeReference(t=clock(n), q_nb=quats(q_nv * stated)),
+            mount=MountReference(t=[0.0], q_vb=quats(stated)),
+            heading="magnetic",
+        ),
+    )
+    assert errors.through_own_mount
+    assert errors.axes == "vehicle"
+    assert errors.left_out == {"mount not found yet": 10}
+    assert errors.heading / DEG == pytest.approx(np.full(20, 0.7), abs=1e-10)
+    assert errors.inclination / DEG == pytest.approx(np.zeros(20), abs=1e-5)
+    assert errors.std_n is None  # what is stated is of the box
+    summary = errors.summary()
+    assert summary["heading_rmse_deg"] == pytest.approx(0.7)
+    assert summary["heading_std_deg"] == pytest.approx(0.0, abs=1e-10)
+    assert summary["inclination_within_3sigma"] is None
+
+
 # --- standard deviations ----------------------------------------------------------------
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from strapdown.evaluation.outages import blank, outage_study, quantile, windows
+from strapdown.evaluation.outages import blank, outage_errors, outage_study, quantile, windows
 from strapdown.recording import (
     Gnss,
     Imu,
@@ -77,7 +77,7 @@ def test_the_reference_alone_decides_which_windows_count():
 
 
 def test_blanking_takes_the_fixes_of_the_windows_and_no_others():
-    rec = blank(recording(), [120.0], 10.0)
+    rec = blank(recording(), [(120.0, 130.0)])
     t = rec.gnss.t
     assert not ((t >= 120.0) & (t <= 130.0)).any()
     assert len(t) == len(recording().gnss.t) - 21
@@ -113,6 +113,31 @@ def test_a_window_without_a_solution_counts_as_infinite():
         "drive", "length_s", "start_s", "horizontal_error_m", "vertical_error_m",
         "percent_of_distance", "heading_error_deg", "solution",
     }  # fmt: skip
+
+
+@pytest.mark.parametrize("against", ["reference", "fixes"])
+def test_outages_that_are_asked_for_are_measured_as_those_of_the_study(against):
+    rec = recording()
+    if against == "fixes":  # those that were withheld
+        rec = replace(rec, reference=None)
+    spans = [(300.0, 360.0), (400.0, 410.0)]
+    long, short = outage_errors(Coaster().run(blank(rec, spans)), rec, spans, name="line")
+    assert (long.drive, long.start_s, long.length_s) == ("line", 300.0, 60.0)
+    assert long.horizontal_error_m == pytest.approx(605.0, rel=5e-3)
+    assert short.horizontal_error_m == pytest.approx(105.0, rel=5e-3)
+    smoothed = replace(Coaster().run(blank(rec, spans)), causal=False)
+    assert outage_errors(smoothed, rec, spans)[0].horizontal_error_m == pytest.approx(
+        305, rel=0.01
+    )
+
+
+def test_outages_beyond_the_positions_or_turned_round_are_refused():
+    rec = recording()
+    sol = Coaster().run(rec)
+    with pytest.raises(ValueError, match=r"positions to compare with, 0\.0 to 599\.9 s"):
+        outage_errors(sol, rec, [(590.0, 610.0)])
+    with pytest.raises(ValueError, match="`spans` must end after they start, got 20 to 10 s"):
+        blank(rec, [(20.0, 10.0)])
 
 
 def test_quantiles_agree_with_numpy_and_know_infinity():

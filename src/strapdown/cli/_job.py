@@ -4,16 +4,18 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 from strapdown import __version__
 from strapdown.cli import _console, _errors, _output, _sensor, _settings, doctor
 from strapdown.errors import DataGap, InputError
 
 if TYPE_CHECKING:
-    from strapdown.evaluation import AttitudeErrors, NavigationErrors
+    from strapdown.evaluation import AttitudeErrors, NavigationErrors, Window
     from strapdown.recording import Recording
     from strapdown.solution import Solution
+
+EXPORTS: Final = ("kml", "gpx", "geojson", "csv", "tum")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -34,6 +36,10 @@ class Job:
         Calibration file to apply first.
     smooth : bool
         Whether to use the estimator's offline twin.
+    outages : sequence of (float, float)
+        Spans [s] in which the fixes are taken away.
+    exports : sequence of str
+        Of `EXPORTS`: more files of the solution or its track.
     report : bool
         Whether to write ``report.html``.
     json : bool
@@ -46,6 +52,8 @@ class Job:
     sensor: str | None = None
     calibration: Path | None = None
     smooth: bool = False
+    outages: Sequence[tuple[float, float]] = ()
+    exports: Sequence[str] = ()
     report: bool = True
     json: bool = False
 
@@ -96,18 +104,22 @@ def _results(
     """Run the estimator, write its files into `aside`, and return the summary."""
     from strapdown import io
 
-    sol = _solution(job, log, rec, timing, progress)
+    sol = _solution(job, log, _without_fixes(job, rec), timing, progress)
     progress.step("comparing with the reference" if rec.reference else "writing")
     errors = _errors_of(sol, rec, progress)
+    outages = _outages_of(job, log, sol, rec)
     files = {"solution": "solution.parquet", "summary": _output.SUMMARY}
     io.write_solution(sol, aside / files["solution"])
+    for kind in job.exports:
+        files[kind] = f"{'solution' if kind == 'csv' else 'track'}.{kind}"
+        io.write_solution(sol, aside / files[kind])
     begun = time.perf_counter()
     if job.report:
         from strapdown import report
 
         progress.step("writing the report")
         files["report"] = "report.html"
-        report.write(sol, rec, aside / files["report"], errors)
+        report.write(sol, rec, aside / files["report"], errors, outages=outages)
     timing["report_s"] = time.perf_counter() - begun
     return {
         _output.MARK: f"strapdown {__version__}",
@@ -122,6 +134,7 @@ def _results(
         "outputs": {key: str(job.folder / file) for key, file in files.items()},
         "timing": timing,
         "errors": None if errors is None else errors.summary(),
+        "outages": [window.as_dict() for window in outages],
     }
 
 
@@ -155,6 +168,12 @@ def _solution(
     flt = _to_true_north(_estimator(name, job), rec, progress)
     if job.smooth and not hasattr(flt, "smooth"):
         raise InputError(f"{name} has no offline twin; leave --smooth out, or choose another.")
+    tracks = [kind for kind in job.exports if kind != "csv"]
+    if tracks and estimators.entry(name).gives != "navigation":
+        raise InputError(
+            f"--export {tracks[0]} needs positions, and {name} gives attitude; leave it out, or "
+            "use a log with GNSS."
+        )
     progress.step(f"estimating with {name}")
     if not estimators.entry(name).is_compiled():
         progress.note(f"compiling {name} (once)")
@@ -165,6 +184,26 @@ def _solution(
     if len(sol) == 0:
         raise InputError(f"{log}: the log must hold inertial samples, it has none.")
     return sol
+
+
+def _without_fixes(job: Job, rec: "Recording") -> "Recording":
+    """Return the recording without the fixes of the outages that were asked for."""
+    if not job.outages:
+        return rec
+    from strapdown.evaluation import blank
+
+    with _errors.given("--outage"):
+        return blank(rec, job.outages)
+
+
+def _outages_of(job: Job, log: str, sol: "Solution", rec: "Recording") -> "tuple[Window, ...]":
+    """Return the errors in the outages that were asked for."""
+    if not job.outages:
+        return ()
+    from strapdown.evaluation import outage_errors
+
+    with _errors.given("--outage"):
+        return outage_errors(sol, rec, job.outages, name=Path(log).name)
 
 
 def _to_true_north(flt: Any, rec: "Recording", progress: _console.Progress) -> Any:
@@ -232,17 +271,37 @@ def _print(summary: dict[str, Any]) -> None:
     if errors is not None:
         print()
         _console.print_table(
-            "", ("error", "RMSE", "largest", ""), _error_rows(errors), right=(1, 2)
+            "", ("error", "RMSE", "spread", "largest", ""), _error_rows(errors), right=(1, 2, 3)
         )
         if errors.get("heading_constant_removed"):
             constant = errors["heading_constant_deg"]
             print(f"Heading is arbitrary: a constant of {constant:.1f} deg was removed.")
+        if errors.get("through_own_mount"):
+            print("Attitude errors are the vehicle's, each side through its own mount.")
         within = errors.get("inclination_within_3sigma")
         if within is not None:
             print(f"Inclination within its stated 3 sigma: {100 * within:.1f} % of the time.")
+    if summary["outages"]:
+        print()
+        _print_outages(summary)
     print()
     for path in summary["outputs"].values():
         print(path)
+
+
+def _print_outages(summary: dict[str, Any]) -> None:
+    """Print how far the solution was off where fixes were taken away."""
+    keys = ("horizontal_error_m", "vertical_error_m", "percent_of_distance", "heading_error_deg")
+    rows = [
+        (
+            f"{w['start_s']:g}:{w['start_s'] + w['length_s']:g}",
+            *("" if w[key] is None else f"{w[key]:.2f}" for key in keys),
+        )
+        for w in summary["outages"]
+    ]
+    header = ("outage s", "horizontal m", "vertical m", "% of way", "heading deg")
+    where = "at the end" if summary["causal"] else "in the middle"
+    _console.print_table(f"error of the antenna {where} of outages", header, rows, right=range(5))
 
 
 def _changed(summary: dict[str, Any]) -> dict[str, Any]:
@@ -254,13 +313,13 @@ def _changed(summary: dict[str, Any]) -> dict[str, Any]:
     return {k: v for k, v in summary["parameters"].items() if v != defaults.get(k)}
 
 
-def _error_rows(errors: dict[str, Any]) -> list[tuple[str, str, str, str]]:
-    """Return one row per kind of error that the summary has."""
+def _error_rows(errors: dict[str, Any]) -> list[tuple[str, ...]]:
+    """Return one row per kind of error that the summary has: RMSE, about the mean, largest."""
     rows = []
     for key, value in errors.items():
         name, found, unit = key.partition("_rmse_")
         if found:
-            largest = errors.get(f"{name}_max_{unit}")
-            shown = "" if largest is None else f"{largest:.2f}"
-            rows.append((name, f"{value:.2f}", shown, unit.replace("m_s", "m/s")))
+            others = (errors.get(f"{name}_{what}_{unit}") for what in ("std", "max"))
+            shown = ("" if other is None else f"{other:.2f}" for other in others)
+            rows.append((name, f"{value:.2f}", *shown, unit.replace("m_s", "m/s")))
     return rows

@@ -1,6 +1,11 @@
 """``strapdown run``: the main job."""
 
+from typing import Annotated
+
+import typer
+
 from strapdown.cli import _job, _options, _output
+from strapdown.errors import InputError
 
 
 @_options.reads_log
@@ -11,6 +16,16 @@ def run(
     sensor: _options.Sensor = None,
     calibration: _options.Calibration = None,
     smooth: _options.Smooth = False,
+    outage: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--outage", metavar="S:S", help="Take the fixes away from then to then; repeatable."
+        ),
+    ] = None,
+    export: Annotated[
+        str | None,
+        typer.Option("--export", metavar="kml,gpx,geojson,csv,tum", help="More files to write."),
+    ] = None,
     folder: _options.Folder = None,
     json: _options.Json = False,
     no_report: _options.NoReport = False,
@@ -18,7 +33,7 @@ def run(
 ) -> None:
     """Find out what a log holds, estimate, compare with its reference, and report.
 
-    Writes solution.parquet, summary.json and report.html.
+    Writes solution.parquet, summary.json and report.html; with --export also the track.
     """
     job = _job.Job(
         filter=filter,
@@ -26,8 +41,30 @@ def run(
         sensor=sensor,
         calibration=calibration,
         smooth=smooth,
+        outages=tuple(_span(text) for text in outage or ()),
+        exports=_kinds(export),
         folder=folder or _output.default_folder(source.main),
         report=not no_report,
         json=json,
     )
     _job.do(job, str(source.main), source.read)
+
+
+def _span(text: str) -> tuple[float, float]:
+    """Return start and end [s] of ``300:360``."""
+    try:
+        start, stop = (float(part) for part in text.split(":"))
+    except ValueError:
+        raise InputError(f"--outage must be START:END in seconds, got {text!r}.") from None
+    if not start < stop:
+        raise InputError(f"--outage must end after it starts, got {text!r}.")
+    return start, stop
+
+
+def _kinds(text: str | None) -> tuple[str, ...]:
+    """Return the endings of ``kml,gpx``."""
+    kinds = tuple(dict.fromkeys(k.strip().lower() for k in (text or "").split(",") if k.strip()))
+    for kind in kinds:
+        if kind not in _job.EXPORTS:
+            raise InputError(f"--export must be of {', '.join(_job.EXPORTS)}, got {kind!r}.")
+    return kinds

@@ -39,8 +39,11 @@ class AttitudeErrors:
         roll and yaw are not defined, and their differences say nothing.
     axes : {'body', 'vehicle'}
         What `rpy` belongs to: the box, or the vehicle by way of the reference's mount.
+    through_own_mount : bool
+        Whether all errors are the vehicle's, each side taken through its own mount.
     std_n : ndarray, shape (m, 3) or None
-        Standard deviations that the estimator states about north, east and down [rad].
+        Standard deviations that the estimator states about north, east and down [rad]. They
+        are the box's: None where the errors are the vehicle's.
     heading_constant : float
         What was taken from all heading and yaw errors [rad]; 0 if nothing was.
     heading_removed : bool
@@ -58,6 +61,7 @@ class AttitudeErrors:
     tilt_n: FloatArray
     rpy: FloatArray
     axes: str
+    through_own_mount: bool
     std_n: FloatArray | None
     heading_constant: float
     heading_removed: bool
@@ -112,6 +116,10 @@ class AttitudeErrors:
             out[f"{name}_rmse_deg"] = s.rmse / DEG
         for name in ("total", "heading", "inclination"):
             out[f"{name}_max_deg"] = float(np.abs(getattr(self, name)).max()) / DEG
+        for name, values in (
+            ("heading", self.heading), ("roll", self.rpy[:, 0]), ("pitch", self.rpy[:, 1]),
+        ):  # fmt: skip
+            out[f"{name}_std_deg"] = _circular_std(values) / DEG
         ratio = self.inclination_sigma_ratio
         out["inclination_within_3sigma"] = self.inclination_within_3sigma
         out["inclination_sigma_ratio"] = (
@@ -120,6 +128,7 @@ class AttitudeErrors:
         out["heading_constant_removed"] = self.heading_removed
         out["heading_constant_deg"] = self.heading_constant / DEG
         out["rpy_axes"] = self.axes
+        out["through_own_mount"] = self.through_own_mount
         return out
 
 
@@ -141,13 +150,19 @@ def attitude_errors(
     are not aligning, and it lies neither outside their span nor in a gap. The solution is
     interpolated to the reference's times.
 
+    Where the solution and the reference both know the mount, all errors are those of the
+    vehicle's attitude, each taken through its own mount: a receiver states the attitude of
+    the vehicle, and its mount, which turns that into the box's, may still be wrong by tens of
+    degrees when its attitude is right. A sample counts from where the solution's mount is
+    found, that is, differs from the identity.
+
     Parameters
     ----------
     solution : Solution
         What was estimated.
     reference : Reference or AttitudeReference
-        What is taken for true. With a mount in it, roll, pitch and yaw are those of the
-        vehicle.
+        What is taken for true. With a mount in it and none in the solution, errors are the
+        box's, but roll, pitch and yaw those of the vehicle by the reference's mount.
     max_gap : float
         Longest interval between samples of the solution that is bridged [s].
     remove_heading : bool, optional
@@ -179,11 +194,18 @@ def attitude_errors(
     found = match(solution.t, parts.attitude.t, max_gap)
     aligned = found.both((solution.status & Status.ALIGNING) == 0)
     counts = aligned & valid[found.rows]
+    q_vb_ref = None if parts.mount is None else mount_at(parts.mount, parts.attitude.t)
+    through = solution.q_vb is not None and q_vb_ref is not None
+    mounted = np.ones_like(counts)
+    if solution.q_vb is not None and through:
+        mounted = found.both((solution.q_vb[:, 1:] != 0.0).any(axis=1))
+        counts &= mounted
     left_out = {
         "outside the span of the solution": found.outside,
         "in a gap of the solution": found.in_gap,
         "reference not valid": int(np.count_nonzero(~valid[found.rows])),
         "solution still aligning": int(np.count_nonzero(valid[found.rows] & ~aligned)),
+        "mount not found yet": int(np.count_nonzero(valid[found.rows] & aligned & ~mounted)),
     }
     left_out = {reason: number for reason, number in left_out.items() if number}
     if not counts.any():
@@ -193,8 +215,11 @@ def attitude_errors(
         )
 
     rows = found.rows[counts]
-    q_est = found.quats(solution.q_nb)[counts]
-    error = quat_mul(q_est, quat_conj(q_ref[rows]))
+    q_est, q_true = found.quats(solution.q_nb)[counts], q_ref[rows]
+    if solution.q_vb is not None and q_vb_ref is not None:
+        q_est = quat_mul(q_est, quat_conj(found.quats(solution.q_vb)[counts]))
+        q_true = quat_mul(q_true, quat_conj(q_vb_ref[rows]))
+    error = quat_mul(q_est, quat_conj(q_true))
 
     removed = remove_heading
     if removed is None:
@@ -205,9 +230,12 @@ def attitude_errors(
         turn = np.array([np.cos(constant / 2.0), 0.0, 0.0, -np.sin(constant / 2.0)])
         error = quat_mul(np.broadcast_to(turn, error.shape), error)
 
-    rpy, axes = _rpy_difference(q_est, q_ref[rows], parts.attitude.t[rows], parts.mount)
+    if q_vb_ref is not None and not through:
+        q_bv = quat_conj(q_vb_ref[rows])
+        q_est, q_true = quat_mul(q_est, q_bv), quat_mul(q_true, q_bv)
+    rpy = rpy_from_quat(q_est) - rpy_from_quat(q_true)
     rpy[:, 2] -= constant
-    std_n = solution.std_attitude_n
+    std_n = None if through else solution.std_attitude_n
     return AttitudeErrors(
         t=parts.attitude.t[rows],
         total=2.0 * np.arctan2(np.linalg.norm(error[:, 1:], axis=1), np.abs(error[:, 0])),
@@ -216,7 +244,8 @@ def attitude_errors(
         * np.arctan2(np.hypot(error[:, 1], error[:, 2]), np.hypot(error[:, 0], error[:, 3])),
         tilt_n=_tilt(error),
         rpy=wrap_pi(rpy),
-        axes=axes,
+        axes="body" if q_vb_ref is None else "vehicle",
+        through_own_mount=through,
         std_n=None if std_n is None else found.linear(std_n)[counts],
         heading_constant=constant,
         heading_removed=removed,
@@ -266,15 +295,10 @@ def _tilt(error: FloatArray) -> FloatArray:
     )
 
 
-def _rpy_difference(
-    q_est: FloatArray, q_ref: FloatArray, t: FloatArray, mount: MountReference | None
-) -> tuple[FloatArray, str]:
-    """Return estimated less true roll, pitch, yaw, and whether of the box or the vehicle."""
-    q_vb = None if mount is None else mount_at(mount, t)
-    if q_vb is None:
-        return rpy_from_quat(q_est) - rpy_from_quat(q_ref), "body"
-    q_bv = quat_conj(q_vb)
-    return rpy_from_quat(quat_mul(q_est, q_bv)) - rpy_from_quat(quat_mul(q_ref, q_bv)), "vehicle"
+def _circular_std(angles: FloatArray) -> float:
+    """Return the standard deviation of angles about their circular mean [rad]."""
+    mean = np.angle(np.mean(np.exp(1j * angles)))
+    return float(np.sqrt(np.mean(wrap_pi(angles - mean) ** 2)))
 
 
 def _note(estimate: str, reference: str, removed: bool, constant: float) -> str:

@@ -59,6 +59,10 @@ class Window:
     heading_error_deg: float | None
     solution: bool
 
+    def as_dict(self) -> dict[str, Any]:
+        """Return JSON-like values; what is infinite or not known is None."""
+        return _finite(asdict(self))
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Start:
@@ -131,7 +135,7 @@ class OutageStudy:
         return {
             "filter": self.filter,
             "smoothed": self.smoothed,
-            "windows": [_finite(asdict(w)) for w in self.windows],
+            "windows": [w.as_dict() for w in self.windows],
             "summary": [_finite(row) for row in self.summary()],
             "starts": [_finite(asdict(s)) for s in self.starts],
         }
@@ -175,27 +179,79 @@ def windows(reference: PositionReference, mount: Any, length: float, phase: floa
     return np.array(starts)
 
 
-def blank(rec: Recording, starts: Sequence[float] | FloatArray, length: float) -> Recording:
-    """Return the recording without the fixes of the windows, both ends included.
+def blank(rec: Recording, spans: Iterable[tuple[float, float]]) -> Recording:
+    """Return the recording without the fixes of some spans of time, both ends included.
 
     Parameters
     ----------
     rec : Recording
         With a stream ``gnss``.
-    starts : sequence of float
-        Starts of the windows [s].
-    length : float
-        Their length [s].
+    spans : iterable of (float, float)
+        Start and end of each [s].
 
     Returns
     -------
     Recording
+
+    Raises
+    ------
+    MissingStream
+        If there are no fixes.
+    ValueError
+        If a span does not end after its start.
     """
     fixes = rec.need("gnss")
     keep = np.ones(len(fixes), dtype=np.bool_)
-    for start in starts:
-        keep &= (fixes.t < start) | (fixes.t > start + length)
+    for start, stop in spans:
+        if not start < stop:
+            raise ValueError(f"`spans` must end after they start, got {start:g} to {stop:g} s.")
+        keep &= (fixes.t < start) | (fixes.t > stop)
     return replace(rec, gnss=fixes.rows(keep))
+
+
+def outage_errors(
+    sol: Solution, rec: Recording, spans: Iterable[tuple[float, float]], name: str = ""
+) -> tuple[Window, ...]:
+    """Return the errors of a solution in given outages.
+
+    Causal: at the end of each. Smoothed: in the middle. Against the reference's position where
+    the recording has one, else against the fixes that were withheld.
+
+    Parameters
+    ----------
+    sol : Solution
+        From ``blank(rec, spans)``.
+    rec : Recording
+        With all its fixes.
+    spans : iterable of (float, float)
+        Start and end of each outage [s].
+    name : str
+        Of the drive.
+
+    Returns
+    -------
+    tuple of Window
+
+    Raises
+    ------
+    ValueError
+        If a span is not within the times of the reference or the fixes.
+    """
+    reference = rec.reference.position if rec.reference is not None else None
+    if reference is None:
+        fixes = rec.need("gnss")
+        there = np.isfinite(fixes.lla).all(axis=1)
+        reference = PositionReference(t=fixes.t[there], lla=fixes.lla[there])
+    found = []
+    for start, stop in spans:
+        first, last = (float(reference.t[0]), float(reference.t[-1])) if len(reference) else (0, 0)
+        if not first <= start < stop <= last:
+            raise ValueError(
+                f"an outage must be within the positions to compare with, {first:.1f} to "
+                f"{last:.1f} s, got {start:g} to {stop:g} s."
+            )
+        found.append(_window(name, sol, rec, reference, start, stop - start))
+    return tuple(found)
 
 
 def outage_study(
@@ -258,32 +314,39 @@ def _run(
     assert rec.reference is not None
     reference = rec.reference.position
     assert reference is not None
-    begin = windows(reference, rec.reference.mount, length, phase)
-    if not len(begin):
+    begin = windows(reference, rec.reference.mount, length, phase).tolist()
+    if not begin:
         return []
-    part = blank(rec, begin, length)
+    part = blank(rec, [(start, start + length) for start in begin])
     sol = estimator.smooth(part) if smooth else estimator.run(part, diagnostics=False)
+    return [_window(name, sol, rec, reference, start, length) for start in begin]
+
+
+def _window(
+    name: str,
+    sol: Solution,
+    rec: Recording,
+    reference: PositionReference,
+    start: float,
+    length: float,
+) -> Window:
+    """Return the error in one outage: at its end, in its middle for a smoother."""
+    at = start + (length if sol.causal else 0.5 * length)
+    error = _error_n(sol, reference, at) if _has_solution(sol, start, at) else None
     steps = np.linalg.norm(np.diff(ned_from_lla(reference.lla, reference.lla[0]), axis=0), axis=1)
     way = np.concatenate(([0.0], np.cumsum(steps)))
-    found = []
-    for start in begin.tolist():
-        at = start + (0.5 * length if smooth else length)
-        error = _error_n(sol, reference, at) if _has_solution(sol, start, at) else None
-        distance = float(np.interp(at, reference.t, way) - np.interp(start, reference.t, way))
-        horizontal = math.inf if error is None else math.hypot(error[0], error[1])
-        found.append(
-            Window(
-                drive=name,
-                length_s=length,
-                start_s=start,
-                horizontal_error_m=horizontal,
-                vertical_error_m=math.inf if error is None else -float(error[2]),
-                percent_of_distance=100.0 * horizontal / distance,
-                heading_error_deg=None if error is None else _heading(sol, rec, at),
-                solution=error is not None,
-            )
-        )
-    return found
+    distance = float(np.interp(at, reference.t, way) - np.interp(start, reference.t, way))
+    horizontal = math.inf if error is None else math.hypot(error[0], error[1])
+    return Window(
+        drive=name,
+        length_s=length,
+        start_s=start,
+        horizontal_error_m=horizontal,
+        vertical_error_m=math.inf if error is None else -float(error[2]),
+        percent_of_distance=100.0 * horizontal / distance if distance > 0.0 else math.nan,
+        heading_error_deg=None if error is None else _heading(sol, rec, at),
+        solution=error is not None,
+    )
 
 
 def _row(sol: Solution, t: float) -> int:
@@ -320,8 +383,7 @@ def _error_n(sol: Solution, reference: PositionReference, at: float) -> FloatArr
 
 def _heading(sol: Solution, rec: Recording, at: float) -> float | None:
     """Heading error in degrees, None where the reference has none."""
-    assert rec.reference is not None
-    attitude = rec.reference.attitude
+    attitude = rec.reference.attitude if rec.reference is not None else None
     if attitude is None or not len(attitude):
         return None
     j = int(np.argmin(np.abs(attitude.t - at)))

@@ -9,7 +9,7 @@ from strapdown.io._reading import read, read_raw
 from strapdown.io._registry import FormatInfo, formats
 from strapdown.io._roles import ROLES
 from strapdown.io._writing import write
-from strapdown.io.solution import read_solution, write_solution
+from strapdown.io.solution import holds_solution, read_solution, write_solution
 
 __all__ = [
     "ROLES",
@@ -19,6 +19,7 @@ __all__ = [
     "RawLog",
     "Table",
     "formats",
+    "holds_solution",
     "read",
     "read_raw",
     "read_solution",

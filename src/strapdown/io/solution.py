@@ -13,13 +13,18 @@ from typing import Any
 import numpy as np
 
 from strapdown.errors import FormatError
+from strapdown.io import track
 from strapdown.io._atomic import written_aside
 from strapdown.io.parquet import KEY, VERSION, as_json, damaged, header_of, open_file
 from strapdown.solution import COLUMNS, Solution
 
 
 def write_solution(sol: Solution, path: str | PathLike[str]) -> None:
-    """Write a solution as ``.parquet``, or as ``.csv``.
+    """Write a solution as the path's ending says.
+
+    ``.parquet`` keeps it bit for bit but for the diagnostics, ``.csv`` its columns in SI;
+    ``.kml``, ``.gpx`` and ``.geojson`` the track for maps, a point per second, ``.tum`` the
+    track and attitude that `evo` reads.
 
     Parameters
     ----------
@@ -31,11 +36,18 @@ def write_solution(sol: Solution, path: str | PathLike[str]) -> None:
     Raises
     ------
     FormatError
-        If it cannot be written, or the ending is another.
+        If it cannot be written, the ending is another, or a track is asked of a solution
+        without positions.
     """
     import pyarrow as pa
 
     target = Path(path)
+    suffix = target.suffix.lower()
+    if suffix in track.SUFFIXES:
+        text = track.text_of(sol, suffix, target)
+        with written_aside(target) as stream:
+            stream.write(text.encode())
+        return
     columns: dict[str, Any] = {"t_s": sol.t}
     for name, labels in COLUMNS.items():
         array = getattr(sol, name)
@@ -45,7 +57,6 @@ def write_solution(sol: Solution, path: str | PathLike[str]) -> None:
             values = array if array.ndim == 1 else array[:, j]
             columns[label] = np.ascontiguousarray(values)
     table = pa.table({k: pa.array(v, from_pandas=False) for k, v in columns.items()})
-    suffix = target.suffix.lower()
     if suffix == ".csv":
         from pyarrow import csv
 
@@ -54,7 +65,9 @@ def write_solution(sol: Solution, path: str | PathLike[str]) -> None:
         return
     if suffix not in (".parquet", ".pq"):
         raise FormatError(
-            f"a solution is written as .parquet or .csv, got {target.suffix!r}", file=target
+            f"a solution is written as .parquet, .csv, {', '.join(track.SUFFIXES)}, "
+            f"got {target.suffix!r}",
+            file=target,
         )
     from pyarrow import parquet
 
@@ -76,6 +89,25 @@ def write_solution(sol: Solution, path: str | PathLike[str]) -> None:
             use_dictionary=False,
             write_page_checksum=True,
         )
+
+
+def holds_solution(path: str | PathLike[str]) -> bool:
+    """Whether a file holds a solution that `write_solution` wrote as Parquet.
+
+    Parameters
+    ----------
+    path : str or path
+        Any file or folder, there or not.
+
+    Returns
+    -------
+    bool
+    """
+    target = Path(path)
+    try:
+        return header_of(open_file(target), target, "solution") is not None
+    except FormatError:
+        return False
 
 
 def read_solution(path: str | PathLike[str]) -> Solution:

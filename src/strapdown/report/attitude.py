@@ -169,7 +169,12 @@ def error_notes(errors: AttitudeErrors) -> list[str]:
         listed = ", ".join(f"{number(count)} {why}" for why, count in errors.left_out.items())
         notes.append(f"Left out: {listed}.")
     notes.append(errors.heading_note)
-    if errors.axes == "vehicle":
+    if errors.through_own_mount:
+        notes.append(
+            "All attitude errors are those of the vehicle, estimate and reference each taken "
+            "through its own mount."
+        )
+    elif errors.axes == "vehicle":
         notes.append("Roll, pitch and yaw are those of the vehicle, by the reference's mount.")
     within, ratio = errors.inclination_within_3sigma, errors.inclination_sigma_ratio
     if within is not None and ratio is not None:

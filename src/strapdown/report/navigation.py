@@ -1,12 +1,13 @@
 """Track, velocity, mount and their errors, as sections of a report."""
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from strapdown._types import FloatArray
 from strapdown.earth import ned_from_lla
-from strapdown.evaluation import NavigationErrors
+from strapdown.evaluation import NavigationErrors, Window
 from strapdown.recording import Recording
 from strapdown.report import decimate
 from strapdown.report.figures import (
@@ -27,6 +28,7 @@ from strapdown.units import DEG
 
 AXES = ("north", "east", "down")
 FIX = "#e08a1e"
+WITHHELD = "#c2272d"
 
 
 class _Local(NamedTuple):
@@ -51,8 +53,8 @@ def _origin(sol: Solution) -> FloatArray | None:
     return sol.lla[there[0]] if len(there) else None
 
 
-def track_section(sol: Solution, rec: Recording) -> Section:
-    """Return the track in local metres, the height and the velocity."""
+def track_section(sol: Solution, rec: Recording, outages: Sequence[Window] = ()) -> Section:
+    """Return the track in local metres, the height and the velocity; fixes not used in red."""
     origin = _origin(sol)
     if origin is None or sol.lla is None:
         return Section(title="Track", blocks=[])
@@ -65,8 +67,15 @@ def track_section(sol: Solution, rec: Recording) -> Section:
     if reference is not None:
         path.append(_path(reference, "reference", REFERENCE, 3.5))
     if fixes is not None:
-        x, y = fixes.r_n[:, 1], fixes.r_n[:, 0]
-        path.append(Series(x=x, y=y, name="GNSS fixes", color=FIX, kind="points", width=4.0))
+        withheld = np.zeros(len(fixes.t), np.bool_)
+        for w in outages:
+            withheld |= (fixes.t >= w.start_s) & (fixes.t <= w.start_s + w.length_s)
+        for name, color, those in (
+            ("GNSS fixes", FIX, ~withheld), ("withheld fixes", WITHHELD, withheld),
+        ):  # fmt: skip
+            if those.any():
+                x, y = fixes.r_n[those, 1], fixes.r_n[those, 0]
+                path.append(Series(x=x, y=y, name=name, color=color, kind="points", width=4.0))
     path.append(_path(track, "estimate", ESTIMATE, 1.6))
     for row, name, color in ((0, "start", "#2c8a4b"), (-1, "end", "#1d232b")):
         x, y = track.r_n[[row], 1], track.r_n[[row], 0]
@@ -120,6 +129,30 @@ def _motion(
         items.append(Series(x=sol.t, y=sol.v_n[:, i], name="estimate"))
         panels.append(Panel(y_label=f"v {axis} [m/s]", items=items, height=120))
     return panels
+
+
+def outage_section(outages: Sequence[Window], *, causal: bool) -> Section:
+    """Return the errors in the outages that were asked for."""
+    rows = [
+        (
+            f"{w.start_s:g} to {w.start_s + w.length_s:g}",
+            w.horizontal_error_m,
+            w.vertical_error_m,
+            w.percent_of_distance,
+            w.heading_error_deg,
+        )
+        for w in outages
+    ]
+    columns = (
+        "fixes withheld [s]", "horizontal [m]", "vertical [m]", "of the way [%]", "heading [°]",
+    )  # fmt: skip
+    where = "at the end" if causal else "in the middle"
+    return Section(
+        title="Outages",
+        intro=f"Error of the antenna {where} of each, against the reference's position or, "
+        "without one, against the withheld fixes. A dash: there was no solution.",
+        blocks=[table(columns, rows, digits=3)],
+    )
 
 
 def sigma_section(sol: Solution) -> Section:

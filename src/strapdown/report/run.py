@@ -1,7 +1,7 @@
 """The report of a run: what an estimator made of a recording."""
 
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +10,7 @@ from strapdown.errors import DataGap
 from strapdown.evaluation import (
     AttitudeErrors,
     NavigationErrors,
+    Window,
     attitude_errors,
     navigation_errors,
 )
@@ -29,6 +30,8 @@ def write(
     path: str | os.PathLike[str],
     errors: Errors | None = None,
     title: str | None = None,
+    *,
+    outages: Sequence[Window] = (),
 ) -> Path:
     """Write the report of a run: one HTML file that opens anywhere, without a network.
 
@@ -48,6 +51,8 @@ def write(
         reference that the solution overlaps.
     title : str, optional
         Heading of the page; by default the name of the recording and of the filter.
+    outages : sequence of Window
+        Errors where fixes were withheld from the estimator.
 
     Returns
     -------
@@ -59,11 +64,16 @@ def write(
     FormatError
         If the file cannot be written.
     """
-    return page.write(compose(sol, rec, errors, title), path)
+    return page.write(compose(sol, rec, errors, title, outages=outages), path)
 
 
 def compose(
-    sol: Solution, rec: Recording, errors: Errors | None = None, title: str | None = None
+    sol: Solution,
+    rec: Recording,
+    errors: Errors | None = None,
+    title: str | None = None,
+    *,
+    outages: Sequence[Window] = (),
 ) -> Page:
     """Return the page that `write` writes."""
     if errors is None:
@@ -80,7 +90,9 @@ def compose(
     if of_attitude is not None:
         sections.append(attitude.error_section(of_attitude, span))
     if sol.is_navigation:
-        sections.append(navigation.track_section(sol, rec))
+        sections.append(navigation.track_section(sol, rec, outages))
+        if outages:
+            sections.append(navigation.outage_section(outages, causal=sol.causal))
         if of_position is not None:
             sections.append(navigation.error_section(of_position, span))
         sections += [navigation.sigma_section(sol), navigation.mount_section(sol)]

@@ -230,6 +230,20 @@ def one_of(name: str, value: Any, choices: Iterable[str]) -> str:
     )
 
 
+def instance(name: str, value: Any, cls: type, way_out: str = "") -> None:
+    """Refuse what is not a `cls`, saying how to get one."""
+    if not isinstance(value, cls):
+        hint = f"; {way_out}" if way_out else ""
+        raise TypeError(f"`{name}` must be a {cls.__name__}, got {type(value).__name__}{hint}.")
+
+
+def recording(name: str, value: Any) -> None:
+    """Refuse what is not a recording."""
+    from strapdown.recording import Recording
+
+    instance(name, value, Recording, "strapdown.read(path) makes one of a log")
+
+
 def nearest(value: Any, choices: Iterable[str]) -> str:
     """Return the tail of a message that offers the nearest choice, or nothing."""
     by_lower = {choice.lower(): choice for choice in choices}

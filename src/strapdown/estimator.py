@@ -309,6 +309,7 @@ class Estimator:
         ValueError
             If the recording begins before the state ends, or the state is another estimator's.
         """
+        _checks.recording("rec", rec)
         state = self._own(state)
         x, P = state.x.copy(), state.P.copy()
         imu = rec.need("imu")
@@ -440,6 +441,7 @@ class Estimator:
 
     def _own(self, state: State) -> State:
         """Return the state if it is this estimator's; a restored name may be an array."""
+        _checks.instance("state", state, State, "`init`, `advance` and `step` give one")
         if state.name != self.NAME:
             raise ValueError(f"`state` must belong to {self.NAME}, got one of {state.name}.")
         if (state.x.shape, state.P.shape) != self._shapes():  # kernels check no index
@@ -749,6 +751,7 @@ def preferred(rec: Recording) -> str:
     MissingStream
         If the recording has no inertial stream.
     """
+    _checks.recording("rec", rec)
     rec.need("imu")
     fit = [e for e in entries() if all(getattr(rec, stream) is not None for stream in e.needs)]
     if not fit:

@@ -61,3 +61,27 @@ def test_what_is_written_is_read_with_defaults(rec, tmp_path):
     again = sd.read(tmp_path / "log.parquet")
     assert np.array_equal(again.imu.acc, rec.imu.acc)
     assert sd.io.read_raw(tmp_path / "log.parquet").tables
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        lambda: sd.attitude.Mekf().run("log.csv"),
+        lambda: sd.attitude.RobustEskf().smooth("log.csv"),
+        lambda: sd.attitude.declination("log.csv"),
+        lambda: sd.doctor.examine("log.csv"),
+        lambda: sd.noise.characterize("log.csv"),
+        lambda: sd.estimators.preferred("log.csv"),
+        lambda: sd.evaluation.blank("log.csv", []),
+    ],
+)
+def test_a_path_in_place_of_a_recording_is_told_how_to_become_one(call):
+    with pytest.raises(TypeError, match=r"must be a Recording, got str; strapdown\.read\(path\)"):
+        call()
+
+
+def test_a_recording_in_place_of_its_reference_is_told_where_that_is(rec, sol):
+    with pytest.raises(TypeError, match=r"must be a Reference, got Recording; .*rec\.reference"):
+        sd.evaluation.attitude_errors(sol, rec)
+    with pytest.raises(TypeError, match=r"must be a Solution, got str"):
+        sd.io.write_solution("sol", "x.csv")

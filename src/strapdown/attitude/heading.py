@@ -4,6 +4,7 @@ from datetime import datetime, timedelta
 
 import numpy as np
 
+from strapdown import _checks
 from strapdown._types import FloatArray
 from strapdown.earth import magnetic_field
 from strapdown.recording import Recording
@@ -23,6 +24,7 @@ def declination(rec: Recording) -> float | None:
     float or None
         Declination [rad], east positive; None if place or date are not known.
     """
+    _checks.recording("rec", rec)
     place, epoch = _place(rec), rec.meta.get("epoch_utc")
     if place is None or epoch is None:
         return None

@@ -212,6 +212,7 @@ class RobustEskf(AttitudeEstimator):
         from strapdown.kernels.robust_eskf_covariance import INTERVAL, N
         from strapdown.kernels.robust_eskf_layout import RECORD_SIZE
 
+        _checks.recording("rec", rec)
         imu = rec.need("imu")
         x, P = self._memory()
         p, w = self._params(), np.zeros(self._kernel().W_SIZE)

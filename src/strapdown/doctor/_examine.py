@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from strapdown._checks import as_vector, in_range, one_of
+from strapdown._checks import as_vector, in_range, one_of, recording
 from strapdown._types import BoolArray
 from strapdown.doctor import _axes, _field, _fixes, _health, _scales, _time
 from strapdown.doctor._finding import Finding, Severity, worst_first
@@ -55,6 +55,8 @@ def examine(
     """
     if up is not None:
         one_of("up", up, _field.UP_AXES)
+    if not isinstance(source, RawLog):
+        recording("source", source)
     log = log_of(source)
     if place is not None:
         log = _placed(log, place)

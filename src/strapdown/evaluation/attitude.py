@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from strapdown import _checks
 from strapdown._types import BoolArray, FloatArray
 from strapdown.errors import DataGap, MissingStream
 from strapdown.evaluation.statistics import ErrorStatistics, robust_circular_mean
@@ -186,6 +187,11 @@ def attitude_errors(
     .. [1] D. Laidig, M. Caruso, A. Cereatti, T. Seel, "BROAD - a benchmark for robust
            inertial orientation estimation", Data 6(7):72, 2021.
     """
+    _checks.instance("solution", solution, Solution, "an estimator's `run` gives one")
+    if not isinstance(reference, AttitudeReference):
+        _checks.instance(
+            "reference", reference, Reference, "a recording has it as `rec.reference`"
+        )
     parts = reference if isinstance(reference, Reference) else Reference(attitude=reference)
     if parts.attitude is None:
         raise MissingStream("attitude errors need a reference with attitude, it has none.")

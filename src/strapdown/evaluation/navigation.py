@@ -140,6 +140,8 @@ def navigation_errors(
     DataGap
         If no sample counts.
     """
+    _checks.instance("solution", solution, Solution, "an estimator's `run` gives one")
+    _checks.instance("reference", reference, Reference, "a recording has it as `rec.reference`")
     if reference.position is None:
         raise MissingStream("navigation errors need a reference with position, it has none.")
     arm = np.zeros(3) if lever_arm_b is None else _checks.as_vector("lever_arm_b", lever_arm_b)

@@ -200,6 +200,7 @@ def blank(rec: Recording, spans: Iterable[tuple[float, float]]) -> Recording:
     ValueError
         If a span does not end after its start.
     """
+    _checks.recording("rec", rec)
     fixes = rec.need("gnss")
     keep = np.ones(len(fixes), dtype=np.bool_)
     for start, stop in spans:
@@ -237,6 +238,8 @@ def outage_errors(
     ValueError
         If a span is not within the times of the reference or the fixes.
     """
+    _checks.instance("sol", sol, Solution, "an estimator's `run` gives one")
+    _checks.recording("rec", rec)
     reference = rec.reference.position if rec.reference is not None else None
     if reference is None:
         fixes = rec.need("gnss")

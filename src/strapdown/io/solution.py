@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from strapdown import _checks
 from strapdown.errors import FormatError
 from strapdown.io import track
 from strapdown.io._atomic import written_aside
@@ -41,6 +42,7 @@ def write_solution(sol: Solution, path: str | PathLike[str]) -> None:
     """
     import pyarrow as pa
 
+    _checks.instance("sol", sol, Solution, "an estimator's `run` gives one")
     target = Path(path)
     suffix = target.suffix.lower()
     if suffix in track.SUFFIXES:

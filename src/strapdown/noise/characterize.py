@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from strapdown._checks import one_of
+from strapdown._checks import one_of, recording
 from strapdown._types import BoolArray, FloatArray
 from strapdown.errors import DataGap, InputError, MissingStream
 from strapdown.noise.allan import AllanDeviation, allan_deviation
@@ -75,6 +75,7 @@ def characterize(
     DataGap
         If gaps leave less than half of the log in one piece.
     """
+    recording("rec", rec)
     names = _wanted(rec, sensors)
     noises: dict[str, SensorNoise] = {}
     curves: dict[str, tuple[AllanDeviation, ...]] = {}

@@ -3,6 +3,19 @@
 from typing import Any
 
 from strapdown import estimator as _estimator
+from strapdown.attitude.determination import (
+    Determination,
+    Observability,
+    compass,
+    davenport,
+    gauss_newton,
+    gradient_descent,
+    master_slave,
+    quest,
+    svd,
+    tilt,
+    triad,
+)
 from strapdown.attitude.heading import declination
 from strapdown.attitude.indirect_ekf import IndirectEkf
 from strapdown.attitude.integration import GyroIntegration
@@ -13,15 +26,26 @@ from strapdown.attitude.robust_eskf import RobustEskf
 from strapdown.attitude.two_stage import TwoStage
 
 __all__ = [
+    "Determination",
     "GyroIntegration",
     "IndirectEkf",
     "Madgwick",
     "Mahony",
     "Mekf",
+    "Observability",
     "RobustEskf",
     "TwoStage",
+    "compass",
     "create",
+    "davenport",
     "declination",
+    "gauss_newton",
+    "gradient_descent",
+    "master_slave",
+    "quest",
+    "svd",
+    "tilt",
+    "triad",
 ]
 
 

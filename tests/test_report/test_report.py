@@ -13,7 +13,7 @@ import pytest
 from strapdown import report
 from strapdown.earth import lla_from_ned
 from strapdown.errors import FormatError
-from strapdown.evaluation import attitude_errors, navigation_errors
+from strapdown.evaluation import attitude_errors, navigation_errors, outage_errors
 from strapdown.recording import Gnss, MountReference, PositionReference, Recording
 from strapdown.report import page
 from strapdown.solution import Status
@@ -273,7 +273,7 @@ def test_a_navigation_report_has_track_errors_and_mount(drive, tmp_path):
     sol, rec = drive
     path = report.write(sol, rec, tmp_path / "drive.html")
     reader = Reader(path.read_text("utf-8"))
-    for heading in ("Track", "Position errors", "Standard deviations", "Mount"):
+    for heading in ("Track", "Position errors", "Standard deviations", "Mount and lever arm"):
         assert heading in reader.text
     errors = navigation_errors(sol, rec.reference)
     assert errors.statistics()["horizontal"].rmse == pytest.approx(np.sqrt(5.0), abs=0.01)
@@ -292,6 +292,22 @@ def test_given_errors_are_used(drive, tmp_path):
     errors = navigation_errors(sol, rec.reference, lever_arm_b=[0.0, 0.0, 100.0])
     reader = Reader(report.write(sol, rec, tmp_path / "r.html", errors=errors).read_text("utf-8"))
     assert page.number(errors.statistics()["vertical"].rmse, 3) in reader.text
+
+
+def test_withheld_fixes_are_drawn_apart_and_their_errors_listed(drive, tmp_path):
+    sol, rec = drive
+    span = (20.0, 30.0)
+    outages = outage_errors(sol, rec, [span])
+    arm = np.tile([0.4, -1.3, 0.2], (len(sol), 1))
+    path = report.write(replace(sol, antenna_b=arm), rec, tmp_path / "r.html", outages=outages)
+    reader = Reader(path.read_text("utf-8"))
+    assert "fixes withheld [s]" in reader.text
+    assert page.number(outages[0].horizontal_error_m, 3) in reader.text
+    track = next(f for f in reader.figures if "east [m]" in json.dumps(f))
+    drawn = {d["name"]: len(unpack(d["x"])) for d in track["data"] if "fixes" in d["name"]}
+    withheld = int(((rec.gnss.t >= span[0]) & (rec.gnss.t <= span[1])).sum())
+    assert drawn == {"GNSS fixes": len(rec.gnss) - withheld, "withheld fixes": withheld}
+    assert any("lever arm [m]" in json.dumps(f) for f in reader.figures)
 
 
 # --- the file ---------------------------------------------------------------------------

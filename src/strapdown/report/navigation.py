@@ -177,20 +177,34 @@ def sigma_section(sol: Solution) -> Section:
 def mount_section(sol: Solution) -> Section:
     """Return the estimated mount, roll, pitch and yaw of the box in the vehicle."""
     if sol.q_vb is None:
-        return Section(title="Mount", blocks=[])
+        return Section(title="Mount and lever arm", blocks=[])
     rpy = rpy_from_quat(sol.q_vb) / DEG
     items = [
         Series(x=sol.t, y=rpy[:, i], name=name, color=AXIS_COLORS[i], period=360.0)
         for i, name in enumerate(("roll", "pitch", "yaw"))
     ]
-    last = table(
-        ("axis", "at the end [°]"), [(name, float(rpy[-1, i])) for i, name in
-                                     enumerate(("roll", "pitch", "yaw"))]
-    )  # fmt: skip
+    blocks = [
+        plot(time_figure([Panel(y_label="angle [°]", items=items)])),
+        table(
+            ("axis", "at the end [°]"),
+            list(zip(("roll", "pitch", "yaw"), rpy[-1].tolist(), strict=True)),
+        ),
+    ]
+    if sol.antenna_b is not None and sol.antenna_b.any():
+        items = [
+            Series(x=sol.t, y=sol.antenna_b[:, i], name="xyz"[i], color=AXIS_COLORS[i])
+            for i in range(3)
+        ]
+        blocks += [
+            plot(time_figure([Panel(y_label="lever arm [m]", items=items)]),
+                 "From the IMU to the GNSS antenna, along the box's axes."),
+            table(("axis", "at the end [m]"),
+                  list(zip("xyz", sol.antenna_b[-1].tolist(), strict=True))),
+        ]  # fmt: skip
     return Section(
-        title="Mount",
+        title="Mount and lever arm",
         intro="Attitude of the box in the vehicle's axes, forward, right, down.",
-        blocks=[plot(time_figure([Panel(y_label="angle [°]", items=items)])), last],
+        blocks=blocks,
     )
 
 

@@ -14,12 +14,12 @@ FS, COUNT = 50.0, 6000
 GYR, ACC, MAG = 2e-4, 3e-3, 2e-8
 
 
-def write(path, *, moving=False, mag=True):
+def write(path, *, moving=False, mag=True, fs=FS):
     rng = np.random.default_rng(6)
-    t = np.arange(COUNT) / FS
+    t = np.arange(COUNT) / fs
 
     def triad(level, mean):
-        return np.column_stack([at_rest(rng, COUNT, FS, N=level, bias=m) for m in mean])
+        return np.column_stack([at_rest(rng, COUNT, fs, N=level, bias=m) for m in mean])
 
     gyr = triad(GYR, (0.01, 0.0, -0.02))
     if moving:
@@ -100,3 +100,62 @@ def test_bad_requests_end_with_status_2(command, tmp_path, arguments, message):
     done = command("characterize", write(tmp_path / "imu.parquet", mag=False), *arguments)
     assert done.status == 2
     assert message in done.line
+
+
+def test_low_pass_of_the_mpu6050_is_chosen_as_in_the_source(command, tmp_path):
+    """Thesis A, 5.3.1, at its rate of 100 Hz: 188 Hz is recommended, all under 42 Hz rejected."""
+    log = write(tmp_path / "rest.parquet", fs=100.0, mag=False)
+    printed = "256:0.98:.110,188:1.9:.083,98:2.8:.069,42:4.8:.055,20:8.3:.046,10:13.4:.045"
+    for low_pass in ("mpu6050", printed):
+        done = command("characterize", log, "--low-pass", low_pass, "--no-report", "--json")
+        assert done.status == 0, done.err
+        study = json.loads(done.out)["low_pass"]
+        assert study["recommended_hz"] == 188.0
+        assert study["rejected_hz"] == [f for f in study["cutoff_hz"] if f < 42.0]
+        assert len(study["rejected_hz"]) >= 2
+
+
+def test_low_pass_is_printed_with_its_verdicts(command, log):
+    done = command("characterize", log, "--low-pass", "mpu6050", "--no-report")
+    assert done.status == 0, done.err
+    rows = [line.split() for line in done.out.splitlines()]
+    assert [row[0] for row in rows if row[-1:] == ["recommended"]] == ["188"]
+    assert [row[0] for row in rows if row[-1:] == ["rejected"]] == ["10", "5"]  # at 50 Hz
+
+
+def test_low_pass_takes_the_noise_of_the_log_where_none_is_given(command, log):
+    pairs = "256:0.98,20:8.3"
+    done = command("characterize", log, "--low-pass", pairs, "--no-report", "--json")
+    assert done.status == 0, done.err
+    study = json.loads(done.out)["low_pass"]
+    sigma = np.array(study["noise_error_rad"]) * FS
+    np.testing.assert_allclose(sigma, GYR * np.sqrt(np.pi * np.array([256.0, 20.0])), rtol=0.1)
+    assert "whose filter must be wide" in done.err
+
+
+@pytest.mark.parametrize(
+    "text", ["mpu6500", "188", "188:1.9,98", "188:1.9,98:2.8:0.07", "a:b", ""]
+)
+def test_low_pass_of_another_form_is_refused(command, log, text):
+    done = command("characterize", log, "--low-pass", text)
+    assert done.status == 2
+    assert "--low-pass must be mpu6050, or cut-offs and delays" in done.line
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("188:1.9", "at least two cut-offs, got 1"),
+        ("188:1.9,-98:2.8", "`cutoff_hz[1]` must be positive"),
+    ],
+)
+def test_low_pass_without_choice_or_sense_is_refused(command, log, text, message):
+    done = command("characterize", log, "--low-pass", text)
+    assert done.status == 2
+    assert message in done.line
+
+
+def test_low_pass_needs_the_gyroscope(command, log):
+    done = command("characterize", log, "--sensors", "acc", "--low-pass", "mpu6050")
+    assert done.status == 2
+    assert "must hold 'gyr', it has acc" in done.line

@@ -15,6 +15,7 @@ from strapdown.noise import (
     identify,
     low_pass_study,
     power_density,
+    sigma_behind_filter,
     static_statistics,
     zero_g,
     zero_rate,
@@ -315,3 +316,24 @@ def test_bias_instability_is_compared_at_the_floor():
 def test_messages(call, error, message):
     with pytest.raises(error, match=message):
         call()
+
+
+def test_noise_behind_a_filter_is_that_of_white_noise_through_one_pole():
+    """N sqrt(pi f_c): half the density's two sides times the noise bandwidth pi/2 f_c."""
+    rng = np.random.default_rng(8)
+    white = 2e-4  # N
+    spectrum = power_density(white * np.sqrt(200.0) * rng.standard_normal(400_000), 200.0)
+    cutoffs = np.array([5.0, 20.0, 98.0, 256.0])  # the last is above half the rate: folded
+    got = sigma_behind_filter(spectrum, cutoffs)
+    # a band of 5 Hz has some 3000 degrees of freedom: 1.3 %; one bin of the sum: 2 %
+    np.testing.assert_allclose(got, white * np.sqrt(np.pi * cutoffs), rtol=0.03)
+
+
+def test_noise_behind_a_filter_adds_to_slow_noise():
+    rng = np.random.default_rng(9)
+    fast, slow = rng.standard_normal(200_000), 0.3 * np.sin(np.arange(200_000) * 0.05)
+    both = power_density(fast + slow, 100.0)
+    alone = power_density(fast, 100.0)
+    f = 0.05 * 100.0 / (2.0 * np.pi)
+    more = sigma_behind_filter(both, [2.0]) ** 2 - sigma_behind_filter(alone, [2.0]) ** 2
+    assert more[0] == pytest.approx(0.5 * 0.09 / (1.0 + (f / 2.0) ** 2), rel=0.02)

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from strapdown.cli import _console, _errors, _options
+from strapdown.cli import _console, _errors, _low_pass, _options
 from strapdown.errors import InputError
 
 if TYPE_CHECKING:
@@ -27,6 +27,14 @@ def characterize(
     sensor_id: Annotated[
         str, typer.Option("--sensor-id", metavar="NAME", help="Which piece of hardware.")
     ] = "",
+    low_pass: Annotated[
+        str | None,
+        typer.Option(
+            "--low-pass",
+            metavar="HZ:MS,...|mpu6050",
+            help="Which of these cut-offs and delays of the gyroscope's filter to choose.",
+        ),
+    ] = None,
     json: _options.Json = False,
     no_report: _options.NoReport = False,
     debug: _options.Debug = False,
@@ -38,6 +46,7 @@ def characterize(
     """
     from strapdown import noise
 
+    filters = None if low_pass is None else _low_pass.filters(low_pass)
     asked = None if sensors is None else [name.strip() for name in sensors.split(",")]
     with _console.progress(3) as progress:
         progress.step(f"reading {source.main}")
@@ -45,6 +54,7 @@ def characterize(
         progress.step("characterizing")
         with _errors.given(str(source.main)):
             found = noise.characterize(rec, asked, sensor_id=sensor_id)
+        study = None if filters is None else _low_pass.study(filters, found)
         progress.step("writing")
         noise.save(found.record, file)
         outputs = {"noise": str(file)}
@@ -61,10 +71,15 @@ def characterize(
                 "sensors": {name: _facts(found, name) for name in found.record.sensors},
                 "filter_noise": filter_noise,
                 "notes": notes,
+                "low_pass": None if study is None else _low_pass.facts(study),
             }
         )
     else:
-        _print(str(source.main), found, outputs, notes)
+        _print(str(source.main), found, notes)
+        if study is not None:
+            _low_pass.show(study)
+        for key, path in outputs.items():
+            _console.print_fact(key, path)
 
 
 def _filter_noise(found: "Characterization") -> tuple[dict[str, float] | None, list[str]]:
@@ -108,7 +123,7 @@ def _facts(found: "Characterization", name: str) -> dict[str, Any]:
     return facts
 
 
-def _print(log: str, found: "Characterization", outputs: dict[str, str], notes: list[str]) -> None:
+def _print(log: str, found: "Characterization", notes: list[str]) -> None:
     """Print a row per axis, and below what to know before the numbers are used."""
     from strapdown.report.noise import SHOWN, cell
 
@@ -152,5 +167,3 @@ def _print(log: str, found: "Characterization", outputs: dict[str, str], notes: 
             _console.note(note)
     if limits:
         _console.note("'< x' is the limit of the record: a noise below x would not have shown.")
-    for key, path in outputs.items():
-        _console.print_fact(key, path)

@@ -20,7 +20,7 @@ or step by step on arrays:
 """
 
 from strapdown.noise.allan import KINDS, AllanDeviation, allan_deviation, default_taus
-from strapdown.noise.bandwidth import LowPassStudy, low_pass_study
+from strapdown.noise.bandwidth import LowPassStudy, low_pass_study, sigma_behind_filter
 from strapdown.noise.characterize import Characterization, characterize
 from strapdown.noise.coefficients import (
     Coefficient,
@@ -79,6 +79,7 @@ __all__ = [
     "require_signal",
     "require_still",
     "save",
+    "sigma_behind_filter",
     "static_statistics",
     "zero_g",
     "zero_rate",

@@ -14,6 +14,7 @@ References
 .. [1] Thesis A (three-axis platform), section 5.3.1, tables 5.1 and 5.2.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
@@ -23,6 +24,7 @@ from numpy.typing import ArrayLike
 
 from strapdown._checks import as_series, positive, same_length
 from strapdown._types import BoolArray, FloatArray, IntArray
+from strapdown.noise.spectrum import PowerDensity
 from strapdown.units import DPS, MS
 
 RATES: Final = (0.1 * DPS, 40.0 * DPS)  # range of rates in [1]_ [rad/s]
@@ -152,3 +154,34 @@ def low_pass_study(
         rejected=rejected,
         recommended=int(np.argmin(np.where(rejected, np.inf, regret))),
     )
+
+
+def sigma_behind_filter(spectrum: PowerDensity, cutoff_hz: ArrayLike) -> FloatArray:
+    """Return the noise that low-pass filters would let through.
+
+    Parameters
+    ----------
+    spectrum : PowerDensity
+        Of a record at rest, made with the filter off or at its widest.
+    cutoff_hz : array_like, shape (c,)
+        Cut-off frequencies of filters of first order [Hz].
+
+    Returns
+    -------
+    ndarray, shape (c,)
+        Standard deviation of samples taken behind the filter, in the signal's unit.
+
+    Notes
+    -----
+    What lies above half the record's sampling rate is taken as white, at the level of the
+    upper half of the record's band: noise that sampling would fold, samples hold.
+    """
+    cutoffs = as_series("cutoff_hz", cutoff_hz)
+    for k, cutoff in enumerate(cutoffs):
+        positive(f"cutoff_hz[{k}]", cutoff)
+    f, density = spectrum.f, spectrum.density
+    level = float(np.mean(density[f >= 0.5 * f[-1]]))
+    passed = density / (1.0 + (f / cutoffs[:, np.newaxis]) ** 2)
+    inside = np.sum(passed, axis=1) * (f[1] - f[0])
+    beyond = level * cutoffs * (0.5 * math.pi - np.arctan(f[-1] / cutoffs))
+    return np.asarray(np.sqrt(inside + beyond))

@@ -296,7 +296,7 @@ def test_given_errors_are_used(drive, tmp_path):
 
 def test_withheld_fixes_are_drawn_apart_and_their_errors_listed(drive, tmp_path):
     sol, rec = drive
-    span = (20.0, 30.0)
+    span = (8.0, 14.0)
     outages = outage_errors(sol, rec, [span])
     arm = np.tile([0.4, -1.3, 0.2], (len(sol), 1))
     path = report.write(replace(sol, antenna_b=arm), rec, tmp_path / "r.html", outages=outages)

@@ -29,11 +29,11 @@ check: $(STAMPS)/dev  ## format, lint, docstrings, types, layers, spelling, kern
 	NUMBA_DISABLE_JIT=1 $(BIN)/python -m pytest -n auto -q -m 'not slow' tests/test_kernels
 	! git grep -nIE '/(work|root|home|Users)/[a-z]'
 
-bench: $(STAMPS)/bench  ## speed, side by side with vqf and imufusion
+bench: $(STAMPS)/bench $(STAMPS)/peers  ## speed and accuracy, side by side with other programs
 	STRAPDOWN_SPEED_TABLE=docs/tables/speed.md $(BIN)/python -m pytest benchmarks -q \
 	  --benchmark-disable-gc --benchmark-columns=median,iqr,rounds
 
-tables: $(STAMPS)/core  ## the tables of the docs, from the real recordings
+tables: $(STAMPS)/core $(STAMPS)/peers  ## the tables of the docs, from the real recordings
 	for script in docs/tables/make_*.py; do $(BIN)/python $$script || exit 1; done
 
 pages: $(STAMPS)/core  ## the output that README and quickstart show
@@ -61,3 +61,9 @@ $(STAMPS)/core: pyproject.toml | $(BIN)/python
 $(STAMPS)/test $(STAMPS)/bench $(STAMPS)/docs $(STAMPS)/dev: pyproject.toml | $(BIN)/python
 	$(PIP) --editable '.[$(@F)]'
 	@mkdir -p $(STAMPS) && touch $@ $(STAMPS)/core
+
+# Programs to compare with that need NumPy 1 live apart.
+$(STAMPS)/peers: benchmarks/peers.txt | $(BIN)/python
+	$(PYTHON) -m venv $(VENV)/peers
+	$(VENV)/peers/bin/python -m pip --disable-pip-version-check --quiet install -r benchmarks/peers.txt
+	@mkdir -p $(STAMPS) && touch $@

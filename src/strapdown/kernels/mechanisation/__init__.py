@@ -1,0 +1,1 @@
+"""Strapdown mechanisations of four frames; no estimation, only integration."""

@@ -1,0 +1,23 @@
+"""Strapdown mechanisations: inertial, Earth, local level and wander azimuth, and in a plane."""
+
+from strapdown.navigation.mechanisation.earth_model import SphericalEarth
+from strapdown.navigation.mechanisation.frames import (
+    Mechanisation,
+    MechanisationState,
+    Start,
+    mechanise,
+)
+from strapdown.navigation.mechanisation.increments import coning_sculling, means_from_points
+from strapdown.navigation.mechanisation.plane import PlaneSolution, mechanise_plane
+
+__all__ = [
+    "Mechanisation",
+    "MechanisationState",
+    "PlaneSolution",
+    "SphericalEarth",
+    "Start",
+    "coning_sculling",
+    "means_from_points",
+    "mechanise",
+    "mechanise_plane",
+]

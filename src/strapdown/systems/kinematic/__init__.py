@@ -1,6 +1,6 @@
 """Thesis B, a sensor for human motion: its experiments."""
 
 from strapdown.systems._parts import Part
-from strapdown.systems.kinematic import static
+from strapdown.systems.kinematic import growth, relations, static
 
-PARTS: tuple[Part, ...] = (static.PART,)
+PARTS: tuple[Part, ...] = (static.PART, growth.PART, relations.PART)

@@ -1,6 +1,6 @@
 """Thesis B, a sensor for human motion: its experiments."""
 
 from strapdown.systems._parts import Part
-from strapdown.systems.kinematic import growth, relations, static
+from strapdown.systems.kinematic import growth, moving, relations, static, still
 
-PARTS: tuple[Part, ...] = (static.PART, growth.PART, relations.PART)
+PARTS: tuple[Part, ...] = (static.PART, growth.PART, relations.PART, still.PART, moving.PART)

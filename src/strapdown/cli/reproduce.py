@@ -8,6 +8,8 @@ import typer
 
 from strapdown.cli import _console, _errors, _options
 
+HEADER = ("item", "thesis", "here", "unit", "tolerance", "verdict", "remark")
+
 if TYPE_CHECKING:
     from strapdown.systems import Part, Row, Shown
 
@@ -62,25 +64,34 @@ def _count(rows: "list[Row]", verdict: str) -> int:
 
 
 def _print(title: str, rows: "Sequence[Row]") -> None:
-    """Print the rows of an experiment."""
-    cells = [
-        (
-            row.item,
-            _cell(row.thesis),
-            _cell(row.here),
-            row.unit,
-            row.tolerance,
-            row.verdict.value,
-            row.remark,
+    """Print the rows of an experiment, each remark once below them.
+
+    Widths are those of the rows, not of the terminal: a line that is folded into columns of a few
+    letters cannot be read, one that is too long can be scrolled.
+    """
+    notes = list(dict.fromkeys(row.remark for row in rows if row.remark))
+    cells = [HEADER]
+    for row in rows:
+        note = f"[{notes.index(row.remark) + 1}]" if row.remark else ""
+        figures = (_cell(row.thesis, 6), _cell(row.here, 5), row.unit)
+        cells.append((row.item, *figures, row.tolerance, row.verdict.value, note))
+    widths = [max(len(line[k]) for line in cells) for k in range(len(HEADER))]
+    print(title)
+    for n, line in enumerate(cells):
+        text = "  ".join(
+            cell.rjust(width) if k in (1, 2) else cell.ljust(width)
+            for k, (cell, width) in enumerate(zip(line, widths, strict=True))
         )
-        for row in rows
-    ]
-    header = ("item", "thesis", "here", "unit", "tolerance", "verdict", "remark")
-    _console.print_table(title, header, cells, right=(1, 2))
+        print(text.rstrip())
+        if n == 0:
+            print("-" * (sum(widths) + 2 * (len(widths) - 1)))
+    for number, remark in enumerate(notes, 1):
+        print(f"[{number}] {remark}")
     print()
 
 
-def _cell(value: float | str | None) -> str:
+def _cell(value: float | str | None, digits: int) -> str:
+    """Return a figure; the thesis's keeps all that is printed."""
     if value is None:
         return ""
-    return value if isinstance(value, str) else f"{value:.4g}"
+    return value if isinstance(value, str) else f"{value:.{digits}g}"

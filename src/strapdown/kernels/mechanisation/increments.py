@@ -7,8 +7,8 @@ rigid motion. Over a step its logarithm is, to the fourth order [1]_,
 
 ``s = sum dv_i + sum_{i<j} k_ij (th_i x dv_j + dv_i x th_j)``
 
-with weights k that are exact for rates that are polynomials of time over the step: the first
-sum is the coning correction, the second that of sculling [2]_. The velocity gained, in the axes
+with weights k that depend on the number of samples: the second sum of the one is the coning
+correction, that of the other the sculling correction [2]_. The velocity gained, in the axes
 of the start, is ``J(phi) s`` with the left Jacobian J of rotations. A step of a single sample may
 look at the sample before as well: then that stands in slot 0 with no weight in the plain sum.
 

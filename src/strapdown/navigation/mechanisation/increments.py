@@ -1,4 +1,9 @@
-"""From samples to the rotation and the velocity of a step: the weights, and their use by hand."""
+"""From samples to the rotation and the velocity of a step: the weights, and their use by hand.
+
+References
+----------
+.. [1] R. B. Miller, "A new strapdown attitude algorithm", J. Guidance 6(4), 1983.
+"""
 
 from collections.abc import Mapping, Sequence
 from typing import Final
@@ -12,18 +17,21 @@ from strapdown.kernels.mechanisation import layout as k
 
 MOST_SAMPLES: Final = 4
 
-# Exact for rates that are polynomials of degree m - 1 over a step of m equal samples: weights of
-# the products of samples i < j, and of the samples in the rate at start and middle of the step,
-# times its length. The end mirrors the start.
+# Weights of the products of samples i < j in a step of m equal samples. Their sums over pairs of
+# the same distance are those that null most terms of the coning error [1]_; they are exact for
+# rates that are linear in time, which settles two and three samples, and those of four are exact
+# for quadratic ones as well.
 _PRODUCTS: Final[Mapping[int, Mapping[tuple[int, int], float]]] = {
     1: {},
     2: {(0, 1): 2 / 3},
     3: {(0, 1): 27 / 40, (1, 2): 27 / 40, (0, 2): 9 / 20},
     4: {
-        (0, 1): 736 / 945, (2, 3): 736 / 945, (0, 2): 334 / 945,
-        (1, 3): 334 / 945, (0, 3): 526 / 945, (1, 2): 654 / 945,
+        (0, 1): 232 / 315, (1, 2): 178 / 315, (2, 3): 232 / 315,
+        (0, 2): 46 / 105, (1, 3): 46 / 105, (0, 3): 18 / 35,
     },
 }  # fmt: skip
+# Weights of the samples in the rate at start and middle of the step, times its length, for rates
+# that are polynomials of degree m - 1. The end mirrors the start.
 _START: Final[Mapping[int, Sequence[float]]] = {
     1: (1.0,),
     2: (3.0, -1.0),
@@ -67,9 +75,9 @@ def fill(p: FloatArray, samples: int, *, compensate: bool) -> None:
 def coning_sculling(dtheta_b: ArrayLike, dvel_b: ArrayLike) -> tuple[FloatArray, FloatArray]:
     """Rotation vector and velocity gained over one interval, from its sub-samples.
 
-    Rate and specific force are taken as polynomials of degree m - 1 through the m sub-samples of
-    equal length; the error is of the fifth order of the interval for any m of two and more, its
-    coning part of order ``2 m + 1``. Gravity is not included.
+    The sub-samples are of equal length. The error of one interval is of its fifth order for two
+    and more of them; that of pure coning of small angles of order ``2 m + 1``. Gravity is not
+    included.
 
     Parameters
     ----------

@@ -1,6 +1,13 @@
 """Thesis B, a sensor for human motion: its experiments."""
 
 from strapdown.systems._parts import Part
-from strapdown.systems.kinematic import growth, moving, relations, static, still
+from strapdown.systems.kinematic import growth, moving, relations, static, still, vectors
 
-PARTS: tuple[Part, ...] = (static.PART, growth.PART, relations.PART, still.PART, moving.PART)
+PARTS: tuple[Part, ...] = (
+    static.PART,
+    growth.PART,
+    relations.PART,
+    still.PART,
+    moving.PART,
+    vectors.PART,
+)

@@ -159,7 +159,7 @@ def _fusion(seed: int) -> list[Row]:
                 "item 26, unsimplified filter, alpha 1e9, one axis at a time",
                 "alpha large: the simplified filter", f"{apart.max() / DEG:.1e} deg apart at most",
                 same=bool(apart.max() < 0.1 * DEG), from_simulation=True,
-                remark="(44), (45); a sample that reads zero leaves out one step, 2 beta dt = 0.087 deg",
+                remark="(44), (45); a sample that reads zero leaves one step out: 2 beta dt",
             ))  # fmt: skip
         else:
             rows.append(not_given(

@@ -48,7 +48,7 @@ RMS: Final = {
     "acc": ("6.3", (5.670e-3, 4.001e-2, 5.711e-2), (2.720e-3, 2.916e-3, 3.679e-3)),
     "mag": ("6.4", (5.402e-2, 1.367e-2, 2.280e-2), (2.189e-2, 1.303e-2, 0.927e-2)),
 }
-# Twelve parameters that the extraction of the thesis derives by (6.11) and (6.12), as `NAMES`:
+# Twelve parameters, derived from the printed matrices by (6.11) and (6.12), as `NAMES`:
 # k, S_b in the unit above, angles in deg.
 DERIVED: Final = {
     "gyr": (1.01812, 1.01667, 0.99980, -1.0967, 3.9611, -0.1656,
@@ -173,7 +173,7 @@ def _to_deg() -> FloatArray:
 
 
 def _derived(sensor: str) -> list[Row]:
-    """Return the parameters of the printed matrix beside those that the extraction derives."""
+    """Return the parameters of the printed matrix beside those derived from it once before."""
     unit = UNITS[sensor][0]
     rows = []
     for k, (name, here) in enumerate(zip(NAMES, physical(sensor), strict=True)):

@@ -31,7 +31,7 @@ COUNTS: Final = (
     ("mpu6050", "acc", 16384.0, "LSB/g", G0),
     ("hmc5883l", "mag", 1090.0, "LSB/G", GAUSS),
 )
-# Standard deviations of the samples that the extraction of the thesis derives from N.
+# Standard deviations of the samples derived from the printed N.
 SIGMA: Final = {
     "gyr": (0.0787, 0.0928, 0.0739),
     "acc": (2.43, 2.69, 3.92),

@@ -20,7 +20,7 @@ PHASES: Final = {
     "update, terrestrial": (4.728, 397152),
 }
 CYCLE_MS: Final = 10.0  # 100 Hz
-# Reads, update, and the sums that the extraction of the thesis derives at both bus clocks [ms].
+# Reads, update, and the sums derived from the tables at both bus clocks [ms].
 SCENARIOS: Final = {
     "space": (1, "update, space", {"100 kHz": 3.549, "400 kHz": 2.904}),
     "terrestrial": (3, "update, terrestrial", {"100 kHz": 8.104, "400 kHz": 6.169}),

@@ -1,8 +1,8 @@
 """What the frames differ in: how they turn, what gravity is, how position follows velocity.
 
 For each: `*_middle` writes the turn of the frame and the change of velocity by gravity and
-Coriolis for the middle of the step, found with the values of the step before; `*_move` advances
-the position with the mean velocity.
+Coriolis for the middle of the step, to which it goes with the first half of the specific force
+and the terms of the step before; `*_move` advances the position with the mean velocity.
 
 ==========  ===========================================  ================================
 Frame       velocity                                     position
@@ -43,6 +43,7 @@ from strapdown.kernels.mechanisation.layout import (
     TURN,
     W_COR,
     W_EX,
+    W_IN,
     G,
     U,
     V,
@@ -71,6 +72,7 @@ def cartesian_middle(x: Vec, p: Vec, w: Vec, h: float) -> None:
     if on_earth == 0.0:
         k -= omega * omega
     x[G], x[G + 1], x[G + 2] = k * rx, k * ry, -g * s
+    x[W_IN + 2] = on_earth * omega
     w[TURN], w[TURN + 1], w[TURN + 2] = 0.0, 0.0, on_earth * omega * h
     w[REST] = (x[G] + coriolis * vy) * h
     w[REST + 1] = (x[G + 1] - coriolis * vx) * h
@@ -134,12 +136,14 @@ def _level_terms(
 ) -> None:
     """Turn and rest of a level frame from ``omega_ie`` and the velocity, both in it."""
     # fmt: on
-    w[TURN] = (ix + x[W_EX]) * h
-    w[TURN + 1] = (iy + x[W_EX + 1]) * h
-    w[TURN + 2] = (iz + x[W_EX + 2]) * h
-    kx = 2.0 * ix + x[W_EX]
-    ky = 2.0 * iy + x[W_EX + 1]
-    kz = 2.0 * iz + x[W_EX + 2]
+    for i in range(3):
+        x[W_IN + i] = x[W_EX + i]
+    x[W_IN] += ix
+    x[W_IN + 1] += iy
+    x[W_IN + 2] += iz
+    for i in range(3):
+        w[TURN + i] = x[W_IN + i] * h
+    kx, ky, kz = x[W_IN] + ix, x[W_IN + 1] + iy, x[W_IN + 2] + iz
     x[W_COR], x[W_COR + 1], x[W_COR + 2] = kx, ky, kz
     w[REST] = -(ky * vz - kz * vy) * h
     w[REST + 1] = -(kz * vx - kx * vz) * h

@@ -22,7 +22,8 @@ SPAN = 35  # time of the samples that wait [s]
 BEFORE = 36  # time of the sample before, where slot 0 is for it [s]; zero: there is none
 TH = 37  # angle increments of the slots [rad]: 4 x 3
 DV = 49  # velocity increments of the slots [m/s]: 4 x 3
-X_SIZE = 61
+W_IN = 61  # rate of x in inertial space at the middle of the last step [rad/s]: 3
+X_SIZE = 64
 
 # --- p: parameters ----------------------------------------------------------------------
 FRAME = 0
@@ -52,7 +53,7 @@ P_SIZE = 48
 C0 = 0  # C_xb at the start: 9
 C1 = 9  # at the end: 9
 PHI = 18  # rotation vector of b over the step [rad]: 3
-U = 21  # its change of velocity by specific force, in x at the start [m/s]: 3
+U = 21  # twice the change of velocity by specific force in its first half, in x [m/s]: 3
 TURN = 24  # turn of x in inertial space over the step [rad]: 3
 REST = 27  # change of velocity by gravity and Coriolis [m/s]: 3
 W_SIZE = 30

@@ -50,6 +50,7 @@ from strapdown.kernels.mechanisation.layout import (
     T0,
     TH,
     TURN,
+    W_IN,
     WANDER,
     T,
     U,
@@ -86,21 +87,27 @@ def step(x: Vec, p: Vec, w: Vec) -> None:
     h = x[SPAN]
     if p[FIRST] > 0.0:
         _recall(x, h)
-    w[PHI], w[PHI + 1], w[PHI + 2] = rotation_vector(x, p, m)
+    rx, ry, rz = rotation_vector(x, p, m)
     sx, sy, sz = translation_vector(x, p, m)
-    dx, dy, dz = left_jacobian(w[PHI], w[PHI + 1], w[PHI + 2], sx, sy, sz)
+    w[PHI], w[PHI + 1], w[PHI + 2] = rx, ry, rz
     matrix_of(x, p, w, C0)
-    ux, uy, uz = _times(w, C0, dx, dy, dz)
-    w[U], w[U + 1], w[U + 2] = ux, uy, uz
+    _first_half(x, w, h, sx, sy, sz)
     _middle(x, p, w, h)
     if x[STATUS] != OK:
         return
-    # mean over the step of exp(-turn tau x) u, to second order of the small turn
+    dx, dy, dz = left_jacobian(rx, ry, rz, sx, sy, sz)
+    ux, uy, uz = _times(w, C0, dx, dy, dz)
+    rx, ry, rz = _times(w, C0, rx, ry, rz)
+    # mean over the step of exp(-turn tau x) exp(phi tau x) s, to second order in the small turn:
+    # u - turn x (u / 2 + phi x u / 12 - turn x u / 6)
     tx, ty, tz = w[TURN], w[TURN + 1], w[TURN + 2]
-    ax, ay, az = ty * uz - tz * uy, tz * ux - tx * uz, tx * uy - ty * ux
-    gx = ux - 0.5 * ax + (ty * az - tz * ay) / 6.0 + w[REST]
-    gy = uy - 0.5 * ay + (tz * ax - tx * az) / 6.0 + w[REST + 1]
-    gz = uz - 0.5 * az + (tx * ay - ty * ax) / 6.0 + w[REST + 2]
+    ax, ay, az = rx / 12.0 - tx / 6.0, ry / 12.0 - ty / 6.0, rz / 12.0 - tz / 6.0
+    bx = 0.5 * ux + ay * uz - az * uy
+    by = 0.5 * uy + az * ux - ax * uz
+    bz = 0.5 * uz + ax * uy - ay * ux
+    gx = ux - ty * bz + tz * by + w[REST]
+    gy = uy - tz * bx + tx * bz + w[REST + 1]
+    gz = uz - tx * by + ty * bx + w[REST + 2]
     level = int(p[FRAME]) >= NED
     if level and p[HELD] > 0.0:
         gz = -x[V + 2]
@@ -132,6 +139,18 @@ def step(x: Vec, p: Vec, w: Vec) -> None:
         x[BEFORE] = h
     x[COUNT] = p[FIRST]
     x[SPAN] = 0.0
+
+
+@kernel
+def _first_half(x: Vec, w: Vec, h: float, sx: float, sy: float, sz: float) -> None:
+    """Write twice the change of velocity by specific force over the first half of the step."""
+    ux, uy, uz = left_jacobian(0.5 * w[PHI], 0.5 * w[PHI + 1], 0.5 * w[PHI + 2], sx, sy, sz)
+    ux, uy, uz = _times(w, C0, ux, uy, uz)
+    k = 0.25 * h
+    tx, ty, tz = k * x[W_IN], k * x[W_IN + 1], k * x[W_IN + 2]
+    w[U] = ux - ty * uz + tz * uy
+    w[U + 1] = uy - tz * ux + tx * uz
+    w[U + 2] = uz - tx * uy + ty * ux
 
 
 @kernel

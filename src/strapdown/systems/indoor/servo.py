@@ -22,7 +22,7 @@ from strapdown.rotation import interpolate, quat_from_rpy, rpy_from_quat
 from strapdown.simulation.motions import Servo, Static
 from strapdown.simulation.scenario import Scenario, Timing, load
 from strapdown.systems._parts import Part
-from strapdown.systems._rows import Row, Shown, Tolerance, info, not_given, simulated
+from strapdown.systems._rows import Row, Shown, Tolerance, info, not_given, simulated, worded
 from strapdown.units import DEG, DPS
 
 START_DEG: Final = 110.0
@@ -32,6 +32,7 @@ SLOPE_DPS: Final = 3.13
 SWING_DEG: Final = 90.0
 BIAS_DPS: Final = 3.1291  # table 6.2, z
 BY_EYE_DEG: Final = 3.0  # how well angles can be read off a figure
+LEFT_DPS: Final = 0.1
 SLOW_S: Final = 0.7  # a swing within 245 deg/s less the bias
 
 
@@ -233,15 +234,27 @@ def compensated_rows(name: str, found: Drift) -> list[Row]:
         if found.swing < SWING_DEG - BY_EYE_DEG
         else ""
     )
-    last = found.error[found.t <= LENGTH_S]
+    largest = float(np.abs(found.error[found.t <= LENGTH_S]).max())
     return [
-        simulated(f"6.2.3, {name}, slope after compensation", 0.0, found.slope, "deg/s",
-                  Tolerance(absolute=0.1),
-                  f"0.1 deg/s, a thirtieth of the offset that is taken off{why}"),
-        simulated(f"6.2.3, {name}, largest error of yaw after compensation", 0.0,
-                  float(np.abs(last).max()), "deg", Tolerance(absolute=BY_EYE_DEG),
-                  f"within [0, 90] deg as the board's, read off a figure{why}"),
-    ]  # fmt: skip
+        worded(
+            f"6.2.3, {name}, slope after compensation of the zero-rate",
+            "must be compensated",
+            f"{found.slope:.3f} deg/s left",
+            same=abs(found.slope) <= LEFT_DPS,
+            from_simulation=True,
+            tolerance=f"+-{LEFT_DPS:g} deg/s",
+            remark=f"a thirtieth of the offset that is taken off{why}",
+        ),
+        worded(
+            f"6.3.1, {name}, yaw after compensation",
+            "within 90 deg of the start",
+            f"{largest:.2f} deg off at most",
+            same=largest <= BY_EYE_DEG,
+            from_simulation=True,
+            tolerance=f"+-{BY_EYE_DEG:g} deg",
+            remark=f"as the board's own yaw, read off a figure{why}",
+        ),
+    ]
 
 
 def _nine_axes(rec: Recording, bias: FloatArray) -> list[Row]:

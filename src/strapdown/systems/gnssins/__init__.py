@@ -1,5 +1,6 @@
 """Thesis E, a low-cost integrated GNSS/INS: its experiments."""
 
 from strapdown.systems._parts import Part
+from strapdown.systems.gnssins import budget, calibrations
 
-PARTS: tuple[Part, ...] = ()
+PARTS: tuple[Part, ...] = (calibrations.PART, budget.PART)

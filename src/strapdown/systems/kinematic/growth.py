@@ -13,6 +13,7 @@ from strapdown._types import FloatArray
 from strapdown.report import page
 from strapdown.report.figures import AXIS_COLORS, Panel, Series, grid_figure
 from strapdown.sensors import Digital, Gyro, Linear, Noise
+from strapdown.systems._growth import slope as power
 from strapdown.systems._parts import Part
 from strapdown.systems._rows import Row, Shown, Tolerance, compared, not_given, simulated, worded
 from strapdown.systems.kinematic import device
@@ -68,8 +69,7 @@ def _integrals(x: FloatArray, times: int) -> FloatArray:
 
 def slope(t: FloatArray, y: FloatArray) -> float:
     """Return the slope of |y| over t in log-log axes, from `FIRST` to `LAST`."""
-    ends = np.interp([FIRST, LAST], t, np.abs(y))
-    return float(math.log(ends[1] / ends[0]) / math.log(LAST / FIRST))
+    return power(t, y, FIRST, LAST)
 
 
 def _gyro(t: FloatArray, random: dict[str, FloatArray]) -> list[Row]:

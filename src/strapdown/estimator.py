@@ -21,11 +21,11 @@ from strapdown.errors import MissingStream
 from strapdown.kernels import memory as _m
 from strapdown.kernels import status as _s
 from strapdown.kernels._jit import is_compiled
-from strapdown.recording import Recording
+from strapdown.recording import Imu, Recording
 from strapdown.solution import COLUMNS, Diagnostics, Solution
 
 _NO_VECTOR: FloatArray = np.empty(0)
-_NO_ACC: FloatArray = np.full(3, np.inf)  # absent, as against bad
+_ABSENT: FloatArray = np.full(3, np.inf)  # no sample, as against a bad one
 _NO_TIMES: FloatArray = np.empty(0)
 _NO_ROWS: FloatArray = np.empty((0, 3))
 _NO_EVENTS: FloatArray = np.empty((0, 3))
@@ -108,7 +108,11 @@ class Tracker:
         self._q = self._x[_m.Q : _m.Q + 4]  # a view
 
     def update(
-        self, t: float, gyr: ArrayLike, acc: ArrayLike | None, mag: ArrayLike | None = None
+        self,
+        t: float,
+        gyr: ArrayLike | None,
+        acc: ArrayLike | None,
+        mag: ArrayLike | None = None,
     ) -> None:
         """Feed one sample.
 
@@ -116,8 +120,9 @@ class Tracker:
         ----------
         t : float
             Time [s], later than that of the sample before.
-        gyr : array_like, shape (3,)
-            Angular rate [rad/s]; float64 arrays are the quickest.
+        gyr : array_like, shape (3,), or None
+            Angular rate [rad/s]; float64 arrays are the quickest. None where a slower
+            gyroscope has no new sample.
         acc : array_like, shape (3,), or None
             Specific force [m/s^2]; None where a slower accelerometer has no new sample.
         mag : array_like, shape (3,), optional
@@ -133,7 +138,9 @@ class Tracker:
         if mag is None:
             mag = _NO_VECTOR
         if acc is None:
-            acc = _NO_ACC
+            acc = _ABSENT
+        if gyr is None:
+            gyr = _ABSENT
         try:
             ok = self._update(self._x, self._P, self._p, self._w, t, gyr, acc, mag)
         except TypeError:  # not float64 vectors
@@ -214,6 +221,10 @@ class Estimator:
     _sizes: tuple[tuple[int, ...], tuple[int, ...]]
     NAME: ClassVar[str]
     OUTPUTS: ClassVar[tuple[str, ...]] = ("q_nb", "gyr_bias")
+    LABELS: ClassVar[Mapping[str, tuple[str, ...]]] = {
+        "acc": ("x", "y", "z"),
+        "mag": ("x", "y", "z"),
+    }
     FROM_SENSOR: ClassVar[tuple[Taken, ...]] = ()
 
     @classmethod
@@ -319,9 +330,7 @@ class Estimator:
             raise ValueError(f"`rec` must begin after the state, got {imu.t[0]} after {state.t}.")
         mag = rec.mag
         t_mag, field = (_NO_TIMES, _NO_ROWS) if mag is None else (mag.t, mag.mag)
-        acc = imu.acc
-        if imu.acc_real is not None:  # a held sample is no measurement
-            acc = np.where(imu.acc_real[:, None], acc, np.inf)
+        gyr, acc = real_samples(imu)
         last = max(CELLS[name] + len(COLUMNS[name]) for name in self.OUTPUTS)
         out = np.empty((len(imu), last - _m.STATUS))
         diag = np.empty((len(imu), _m.W_HEAD)) if diagnostics else _NO_DIAGNOSTICS
@@ -329,9 +338,9 @@ class Estimator:
         events = self._events(rec)
         kernel.run(
             x, P, self._params(), np.zeros(kernel.W_SIZE),
-            imu.t, imu.gyr, acc, t_mag, field, events, out, diag,
+            imu.t, gyr, acc, t_mag, field, events, out, diag,
         )  # fmt: skip
-        rows = _diagnostics(imu.t, diag) if diagnostics else {}
+        rows = _diagnostics(imu.t, diag, self.LABELS) if diagnostics else {}
         return self._solution(rec, imu.t, out, rows), State(self.NAME, x, P)
 
     def run(self, rec: Recording, *, diagnostics: bool = True) -> Solution:
@@ -354,7 +363,7 @@ class Estimator:
         self,
         state: State,
         t: float,
-        gyr: ArrayLike,
+        gyr: ArrayLike | None,
         acc: ArrayLike | None,
         mag: ArrayLike | None = None,
         **aiding: ArrayLike,
@@ -367,8 +376,9 @@ class Estimator:
             After the sample before.
         t : float
             Time [s].
-        gyr : array_like, shape (3,)
-            Angular rate [rad/s].
+        gyr : array_like, shape (3,), or None
+            Angular rate [rad/s]; None where a slower gyroscope has no new sample: the last
+            rate is held.
         acc : array_like, shape (3,), or None
             Specific force [m/s^2]; None where a slower accelerometer has no new sample.
         mag : array_like, shape (3,), optional
@@ -396,7 +406,9 @@ class Estimator:
         if mag is None:
             mag = _NO_VECTOR
         if acc is None:
-            acc = _NO_ACC
+            acc = _ABSENT
+        if gyr is None:
+            gyr = _ABSENT
         try:
             ok = update(x, P, p, w, t, gyr, acc, mag)
         except TypeError:  # not float64 vectors
@@ -489,6 +501,26 @@ class Estimator:
         )
 
 
+def real_samples(imu: Imu) -> tuple[FloatArray, FloatArray]:
+    """Return rates and specific forces as kernels take them: held samples are infinite.
+
+    Parameters
+    ----------
+    imu : Imu
+        With masks of the real samples, or without.
+
+    Returns
+    -------
+    gyr, acc : ndarray, shape (n, 3)
+    """
+    gyr, acc = imu.gyr, imu.acc
+    if imu.gyr_real is not None:
+        gyr = np.where(imu.gyr_real[:, None], gyr, np.inf)
+    if imu.acc_real is not None:
+        acc = np.where(imu.acc_real[:, None], acc, np.inf)
+    return gyr, acc
+
+
 def _from_sensor(cls: type[Estimator], sensor: Noisy) -> dict[str, float]:
     """Return the parameters that a sensor's noise gives."""
     if not cls.FROM_SENSOR:
@@ -527,8 +559,8 @@ def _as_kernel_input(
         mag = np.array(_checks.as_vector("mag", mag, allow_nan=True))
     return (
         _checks.finite("t", t),
-        np.array(_checks.as_vector("gyr", gyr, allow_nan=True)),
-        acc if acc is _NO_ACC else np.array(_checks.as_vector("acc", acc, allow_nan=True)),
+        gyr if gyr is _ABSENT else np.array(_checks.as_vector("gyr", gyr, allow_nan=True)),
+        acc if acc is _ABSENT else np.array(_checks.as_vector("acc", acc, allow_nan=True)),
         mag,
     )
 
@@ -563,19 +595,22 @@ _INBOX: Mapping[str, tuple[int, int]] = {
 }
 
 
-def _diagnostics(t: FloatArray, diag: FloatArray) -> dict[str, Diagnostics]:
+def _diagnostics(
+    t: FloatArray, diag: FloatArray, labels: Mapping[str, tuple[str, ...]]
+) -> dict[str, Diagnostics]:
     """Return the rows at which there was a measurement, by sensor."""
     found = {}
     for name, cell in (("acc", _m.D_ACC), ("mag", _m.D_MAG)):
         outcome: IntArray = diag[:, cell + 6].astype(np.int64)
         rows = np.flatnonzero(outcome != _s.NOT_MEASURED)
         if len(rows):
+            n = len(labels[name])
             found[name] = Diagnostics(
                 t=t[rows],
-                innovation=diag[rows, cell : cell + 3],
-                sigma=diag[rows, cell + 3 : cell + 6],
+                innovation=diag[rows, cell : cell + n],
+                sigma=diag[rows, cell + 3 : cell + 3 + n],
                 outcome=outcome[rows],
-                labels=("x", "y", "z"),
+                labels=labels[name],
             )
     return found
 

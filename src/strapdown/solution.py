@@ -29,8 +29,9 @@ class Status(IntFlag):
     GAP = _s.GAP  # the time since the last sample is longer than `max_gap`
     REST = _s.REST  # the device is found to be at rest
     SATURATED = _s.SATURATED  # a sensor is at the end of its range
-    MAG_DISTURBED = _s.MAG_DISTURBED  # the field is found to be disturbed
+    MAG_DISTURBED = _s.MAG_DISTURBED  # the field is not as usual: disturbed
     OUTAGE = _s.OUTAGE  # aiding that bounds the position is missing
+    MAG_MISSING = _s.MAG_MISSING  # no valid field for seconds, though there was one
 
 
 @unique

@@ -28,9 +28,12 @@ def errors(flt, r_nb, error_n, gyr_bias=(0, 0, 0), n=200, dt=0.01, field=None):
 
 
 def test_one_step_follows_the_equations_of_the_filter():
-    """Rate plus kp times the sum of cross products less bias, which integrates -ki times it."""
+    """Rate plus kp times the error less bias, which integrates -ki times the error.
+
+    The error: gravity's cross product, and the sine of the heading's error about down.
+    """
     rng = np.random.default_rng(1)
-    flt, dt, rate = Mahony(kp=0.7, ki=0.3), 0.02, np.array([0.5, -0.8, 1.3])
+    flt, dt, rate = Mahony(kp=0.7, ki=0.3, limit=np.inf), 0.02, np.array([0.5, -0.8, 1.3])
     for q in random_quats(10, seed=3):
         acc, mag = 9 * unit(rng.standard_normal(3)), unit(rng.standard_normal(3))
         b0 = np.array([0.02, -0.01, 0.03])
@@ -40,7 +43,8 @@ def test_one_step_follows_the_equations_of_the_filter():
         h = rotation(q).apply(mag)
         field = to_b.apply([np.hypot(h[0], h[1]), 0.0, h[2]])
         down = to_b.apply([0, 0, 1])
-        error = np.cross(-unit(acc), down) + np.cross(mag, field)
+        heading = np.arctan2(h[1], h[0])
+        error = np.cross(-unit(acc), down) - np.sin(heading) * down
         b1 = b0 - 0.3 * error * dt
         want = rotation(q) * Rotation.from_rotvec((rate - b1 + 0.7 * error) * dt)
         np.testing.assert_allclose(bias(x), b1, atol=1e-15)
@@ -61,23 +65,29 @@ def test_tilt_error_decays_as_exp_minus_kp_t(kp):
     np.testing.assert_allclose(got[:, 2], 0.0, atol=1e-4)  # second order of the error
 
 
-def test_heading_and_tilt_decay_together_as_the_linearised_filter_does():
-    """A field that is off in heading pulls on the tilt too; the slowest rate is kp (1 - sin dip).
-
-    With the unit field (c, 0, s) and the observed heading ``phi_d - phi_n s / c`` the sum of the
-    cross products is ``(phi_n, phi_e, 0) + (phi_d - phi_n s / c) (-c s, 0, c^2)``.
-    """
-    error_n = np.array([0.01, -0.005, 0.02])
+@pytest.mark.parametrize("limit", [0.05, 0.2])
+def test_large_tilt_errors_decay_at_a_limited_rate(limit):
     r_nb = Rotation.from_euler("ZYX", [1.0, -0.4, 2.5])
-    kp, (c, _, s) = 2.0, unit(FIELD_N)
-    matrix = np.array([[1 + s**2, 0.0, -c * s], [0.0, 1.0, 0.0], [-c * s, 0.0, c**2]])
-    assert np.linalg.eigvalsh(matrix)[0] == pytest.approx(1.0 - s, rel=1e-12)
-    for k in (50, 100, 200):
-        got, _ = errors(Mahony(kp=kp, ki=0.0), r_nb, error_n, n=k, field=FIELD_N)
-        want = expm(-kp * 0.01 * k * matrix) @ error_n
-        # steps of 10 ms: kp^2 dt t / 2 relative; second order of the errors: 2e-4
-        np.testing.assert_allclose(got[-1], want, atol=4e-4)
-        assert np.linalg.norm(want) > 2e-3
+    got, _ = errors(Mahony(kp=2.0, ki=0.0, limit=limit), r_nb, [0.6, 0.0, 0.0], n=100)
+    # 1 s at kp * limit, all of it beyond the limit; round-off
+    np.testing.assert_allclose(got[-1], [0.6 - 2.0 * limit, 0.0, 0.0], atol=1e-12)
+
+
+def test_heading_decays_as_tilt_does_whatever_the_dip():
+    """And an error of heading leaves the tilt alone; one of tilt shows in the observed heading.
+
+    With the unit field (c, 0, s) the observed heading is off by ``phi_d - phi_n s / c``.
+    """
+    error_n, kp = np.array([0.01, -0.005, 0.02]), 2.0
+    r_nb = Rotation.from_euler("ZYX", [1.0, -0.4, 2.5])
+    for field in (FIELD_N, np.array([1e-5, 0.0, 4.5e-5])):
+        c, _, s = unit(field)
+        matrix = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [-s / c, 0.0, 1.0]])
+        for k in (50, 100, 200):
+            got, _ = errors(Mahony(kp=kp, ki=0.0), r_nb, error_n, n=k, field=field)
+            want = expm(-kp * 0.01 * k * matrix) @ error_n
+            # steps of 10 ms: kp^2 dt t / 2 relative; second order of the errors: 6e-4
+            np.testing.assert_allclose(got[-1], want, atol=1.2e-3)
 
 
 def test_gravity_alone_leaves_the_heading():
@@ -87,10 +97,7 @@ def test_gravity_alone_leaves_the_heading():
 
 
 def test_bias_is_found_and_its_error_leaves():
-    """kp = 1, ki = 0.1: the slowest poles are those of heading, with 1 - sin(dip) = 0.168.
-
-    s^2 + 0.168 s + 0.0168: real part -0.084, so 180 s leave exp(-15) = 3e-7 of 0.04 rad/s.
-    """
+    """kp = 1, ki = 0.1: s^2 + s + 0.1, slowest pole -0.113, so 180 s leave 1.5e-9 of it."""
     r_nb = Rotation.from_euler("ZYX", [1.0, -0.4, 2.5])
     b = np.array([0.02, -0.03, 0.01])
     got, x = errors(Mahony(kp=1.0, ki=0.1), r_nb, [0, 0, 0], b, n=3600, dt=0.05, field=FIELD_N)
@@ -104,7 +111,7 @@ def test_declination_turns_the_heading_that_it_settles_at(declination):
     r_nb = Rotation.from_euler("ZYX", [1.0, -0.4, 2.5])  # b to magnetic north
     flt = Mahony(kp=2.0, ki=0.0, declination=declination)
     got, _ = errors(flt, r_nb, [0, 0, 0.1], n=3000, dt=0.02, field=FIELD_N)
-    # 60 s at kp (1 - sin dip) = 0.336 leave exp(-20) = 2e-9 of half a radian
+    # 60 s at kp = 2 leave exp(-120)
     np.testing.assert_allclose(got[-1], [0, 0, -declination], atol=1e-8)
 
 

@@ -237,7 +237,7 @@ def test_field_row_is_the_derivative_of_the_heading_seen(field_n):
     assert k.update_heading(P, w, angle, *down, *field, r, np.inf)
     np.testing.assert_allclose(w[k.W_DX : k.W_DX + 6], gain * across * angle, atol=1e-8)
     np.testing.assert_allclose(P, want, atol=1e-8)
-    assert w[m.D_MAG + 1] == pytest.approx(across * angle, rel=1e-14)
+    assert w[m.D_MAG] == pytest.approx(across * angle, rel=1e-14)
     assert w[m.D_MAG + 6] == s.ACCEPTED
 
 

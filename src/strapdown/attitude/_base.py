@@ -22,6 +22,9 @@ class AttitudeEstimator(Estimator):
         Whether to use the magnetometer where there is one. False: heading is arbitrary.
     declination : float, optional
         Heading of magnetic north, east positive [rad]. Given, heading is true; None, magnetic.
+    reject_disturbed : bool
+        Whether a field whose strength is a fifth, or whose dip is 11 deg off the usual one is
+        left out, not only flagged. What stays the same for half a minute becomes usual.
     max_gap : float
         A longer interval between samples [s] is a gap: covariance is widened, or, where there
         is none, attitude is aligned again and the bias kept.
@@ -32,14 +35,17 @@ class AttitudeEstimator(Estimator):
 
     use_mag: bool = True
     declination: float | None = None
+    reject_disturbed: bool = False
     max_gap: float = 1.0
     gyr_range: float = math.inf
     acc_range: float = math.inf
 
     def __post_init__(self) -> None:
         """Check the parameters."""
-        if not isinstance(self.use_mag, bool):
-            raise TypeError(f"`use_mag` must be True or False, got {self.use_mag!r}.")
+        for name in ("use_mag", "reject_disturbed"):
+            value = getattr(self, name)
+            if not isinstance(value, bool):
+                raise TypeError(f"`{name}` must be True or False, got {value!r}.")
         if self.declination is not None:
             _checks.in_range("declination", self.declination, -math.pi, math.pi)
         _checks.positive("max_gap", self.max_gap)
@@ -58,10 +64,11 @@ class AttitudeEstimator(Estimator):
         p[_m.P_GYR_RANGE] = self.gyr_range
         p[_m.P_ACC_RANGE] = self.acc_range
         p[_m.P_REALIGN] = 1.0
+        p[_m.P_REJECT] = float(self.reject_disturbed)
         return p
 
     def _heading_reference(self, rec: Recording) -> str:
         """Return what the heading of a solution is measured from."""
-        if rec.mag is None or not self.use_mag:
+        if rec.mag is None or not self.use_mag or not np.isfinite(rec.mag.mag).all(axis=1).any():
             return "arbitrary"
         return "magnetic" if self.declination is None else "true"

@@ -40,6 +40,8 @@ class IndirectEkf(AttitudeEstimator):
 
     Parameters
     ----------
+    reject_disturbed : bool
+        Whether a field of unusual strength or dip is left out, not only flagged.
     gyr_noise : float
         Angle random walk N [rad/s/sqrt(Hz)]. Larger trusts the gyroscope less.
     gyr_bias_noise : float
@@ -71,7 +73,8 @@ class IndirectEkf(AttitudeEstimator):
         Innovations beyond so many sigma are weighted down. Infinite, as in the source, switches
         it off.
     gap_rate : float
-        Rate that may have gone unseen in a gap or beyond the gyro's range [rad/s].
+        Rate that may have gone unseen in a gap or beyond the gyro's range [rad/s]. A gap in which
+        it hides more than `std_tilt` levels again, and takes the heading from the next field.
     gravity : float
         Magnitude of gravity [m/s^2].
 
@@ -99,6 +102,7 @@ class IndirectEkf(AttitudeEstimator):
         Taken("mag_noise", "mag_noise"),
         Taken("std_gyr_bias", "gyr_bias_std"),
     )
+    reject_disturbed: bool = True
     gyr_noise: float = 8.2e-3 * DEG
     gyr_bias_noise: float = 1.1e-4 * DEG
     acc_noise: float = 1.0
@@ -149,7 +153,7 @@ class IndirectEkf(AttitudeEstimator):
         -------
         IndirectEkf
         """
-        ours = {"acc_noise": 3.0e-4 * G0, "gate": math.inf}
+        ours = {"acc_noise": 3.0e-4 * G0, "gate": math.inf, "reject_disturbed": False}
         start = {"std_tilt": 1.0, "std_heading": 1.0, "std_gyr_bias": 1.0}
         return cls(**{**ours, **start, **parameters})
 

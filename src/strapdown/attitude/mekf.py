@@ -1,6 +1,7 @@
 """Multiplicative extended Kalman filter: quaternion and gyro bias."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -35,6 +36,8 @@ class Mekf(AttitudeEstimator):
 
     Parameters
     ----------
+    reject_disturbed : bool
+        Whether a field of unusual strength or dip is left out, not only flagged.
     gyr_noise : float
         Angle random walk [rad/s/sqrt(Hz)]. Larger trusts the gyroscope less.
     gyr_bias_noise : float
@@ -51,7 +54,8 @@ class Mekf(AttitudeEstimator):
     gate : float
         Innovations beyond so many sigma are weighted down. Infinite switches it off.
     gap_rate : float
-        Rate that may have gone unseen in a gap or beyond the gyro's range [rad/s].
+        Rate that may have gone unseen in a gap or beyond the gyro's range [rad/s]. A gap in which
+        it hides more than `std_tilt` levels again, and takes the heading from the next field.
     gravity : float
         Magnitude of gravity [m/s^2].
 
@@ -74,12 +78,14 @@ class Mekf(AttitudeEstimator):
 
     NAME: ClassVar[str] = "mekf"
     OUTPUTS: ClassVar[tuple[str, ...]] = ("q_nb", "gyr_bias", "std_attitude_n", "std_gyr_bias")
+    LABELS: ClassVar[Mapping[str, tuple[str, ...]]] = {"acc": ("x", "y", "z"), "mag": ("heading",)}
     FROM_SENSOR: ClassVar[tuple[Taken, ...]] = (
         Taken("gyr_noise", "gyr_noise"),
         Taken("gyr_bias_noise", "gyr_bias_walk"),
         Taken("acc_noise", "acc_noise", floor=True),
         Taken("std_gyr_bias", "gyr_bias_std"),
     )
+    reject_disturbed: bool = True
     gyr_noise: float = 3e-4
     gyr_bias_noise: float = 3e-5
     acc_noise: float = 1.5

@@ -9,7 +9,7 @@ from strapdown import _checks
 from strapdown._types import FloatArray
 from strapdown.attitude._base import AttitudeEstimator
 from strapdown.constants import G0
-from strapdown.estimator import Taken, register
+from strapdown.estimator import Taken, real_samples, register
 from strapdown.kernels import memory as _m
 from strapdown.recording import Recording
 from strapdown.solution import Solution
@@ -219,16 +219,14 @@ class RobustEskf(AttitudeEstimator):
         t_mag, field = (
             (np.empty(0), np.empty((0, 3))) if rec.mag is None else (rec.mag.t, rec.mag.mag)
         )
-        acc = imu.acc
-        if imu.acc_real is not None:  # a held sample is no measurement
-            acc = np.where(imu.acc_real[:, None], acc, np.inf)
+        gyr, acc = real_samples(imu)
         n = len(imu)
         out = np.empty((n, _m.STD_BG + 3 - _m.STATUS))
         most = int((imu.t[-1] - imu.t[0]) / self.interval) + 1 if n else 0
         records = np.empty((min(n, most), RECORD_SIZE))
         ends = np.zeros(len(records), dtype=np.int64)
         count = smoother.forward(
-            x, P, p, w, imu.t, imu.gyr, acc, t_mag, field, self._events(rec), out,
+            x, P, p, w, imu.t, gyr, acc, t_mag, field, self._events(rec), out,
             np.empty((0, _m.W_HEAD)), records, ends,
         )  # fmt: skip
         correction = np.empty((int(count), smoother.CORRECTION_SIZE))

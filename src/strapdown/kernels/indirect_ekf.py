@@ -18,13 +18,17 @@ from strapdown.kernels.mekf import (
     P_GRAVITY,
     P_GYR_NOISE,
     P_MAG_NOISE,
+    P_STD_HEADING,
+    STARTED,
     T_ACC,
     T_MAG,
     W_A,
     W_B,
     W_DX,
+    bridge_gap,
     predict,
     reset_attitude,
+    reset_heading,
     transition,
     update_scalar,
     write_std,
@@ -48,7 +52,6 @@ from strapdown.kernels.memory import (
     START,
     STATUS,
     TILT,
-    WIDEN,
     Q,
     T,
     begin,
@@ -265,6 +268,7 @@ def learn_reference(x: Vec) -> None:
 @kernel
 def restart(x: Vec, P: Mat, p: Vec) -> None:
     """Set covariance and clocks after an alignment."""
+    x[STARTED] = 1.0
     reset_attitude(x, P, p)
     x[T_ACC] = x[T]
     x[T_MAG] = x[T]
@@ -307,19 +311,27 @@ def step(
     ew, ex, ey, ez = exp(rx, ry, rz)  # (7.9)
     qw, qx, qy, qz = mul(x[Q], x[Q + 1], x[Q + 2], x[Q + 3], ew, ex, ey, ez)
     x[Q], x[Q + 1], x[Q + 2], x[Q + 3] = normalize(qw, qx, qy, qz)
-    if todo == START:
-        if has_mag and x[ALIGNED] == FULL and x[REF_H] == 0.0:
-            learn_reference(x)
-        restart(x, P, p)
-        return
-    if dt == 0.0:  # the first sample of a given attitude: no interval, nothing to weigh by
+    if todo == START and has_mag and x[ALIGNED] == FULL and x[REF_H] == 0.0:
+        learn_reference(x)
+    if x[STARTED] == 0.0:
+        if todo == START:  # not so if the attitude was given
+            restart(x, P, p)
+            return
+        x[STARTED] = 1.0
         x[T_ACC] = x[T]
         x[T_MAG] = x[T]
     propagate(P, w, p, rx, ry, rz, dt)
-    if todo == WIDEN or (int(x[STATUS]) & s.SATURATED) != 0:
+    if (int(x[STATUS]) & s.SATURATED) != 0:
         unknown = p[P_GAP_RATE] * dt
         for i in range(3):
             P[i, i] += min(unknown * unknown, pi * pi)
+    if (int(x[STATUS]) & s.GAP) != 0:
+        bridge_gap(x, P, p, dt, has_acc, ax, ay, az)
+    if todo == START:  # the first field, or the first after a gap, has just set the heading
+        reset_heading(x, P, p[P_STD_HEADING] * p[P_STD_HEADING])
+        x[T_MAG] = x[T]
+        write_std(x, P)
+        return
 
     for i in range(6):
         w[W_DX + i] = 0.0
@@ -335,6 +347,8 @@ def step(
         if not update_vector(P, w, D_ACC, dx, dy, dz, k * ax, k * ay, k * az, r, p[P_GATE]):
             set_status(x, s.ACC_REJECTED)
         x[T_ACC] = t
+    if (int(x[STATUS]) & s.MAG_DISTURBED) != 0 and not has_mag:
+        x[T_MAG] = t  # the next one does not stand for the time of those left out
     if has_mag and t > x[T_MAG]:
         if x[REF_H] == 0.0:
             learn_reference(x)

@@ -34,8 +34,11 @@ from strapdown.kernels.quat import down_in_body
 
 P_KP = P_HEAD  # [1/s]
 P_KI = P_HEAD + 1  # [1/s^2]
-P_SIZE = P_HEAD + 2
+P_LIMIT = P_HEAD + 2  # of the accelerometer's error, a sine
+P_SIZE = P_HEAD + 3
 W_SIZE = W_HEAD
+
+MIN_HORIZONTAL = 0.01  # square of the field's horizontal part below which it says less [1]
 
 
 # fmt: off
@@ -60,15 +63,25 @@ def step(
         mx, my, mz = k * ax, k * ay, k * az
         dx, dy, dz = down_in_body(qw, qx, qy, qz)
         ex, ey, ez = my * dz - mz * dy, mz * dx - mx * dz, mx * dy - my * dx
+        size = sqrt(ex * ex + ey * ey + ez * ez)
+        if size > p[P_LIMIT]:  # a linear acceleration rather than an error of tilt
+            size = p[P_LIMIT] / size
+            ex, ey, ez = size * ex, size * ey, size * ez
         note(w, D_ACC, mx - dx, my - dy, mz - dz, s.ACCEPTED)
     if has_mag:
         mx, my, mz = x[MAG + 1], x[MAG + 2], x[MAG + 3]
         k = 1.0 / sqrt(mx * mx + my * my + mz * mz)
         mx, my, mz = k * mx, k * my, k * mz
         dx, dy, dz = field_in_body(qw, qx, qy, qz, mx, my, mz, p[P_COS_D], p[P_SIN_D])
-        ex += my * dz - mz * dy
-        ey += mz * dx - mx * dz
-        ez += mx * dy - my * dx
+        # About down alone, by the sine of the heading's error: dip says nothing of the tilt, and
+        # a heading shall settle as quickly near the poles as elsewhere.
+        ux, uy, uz = down_in_body(qw, qx, qy, qz)
+        along = ux * dx + uy * dy + uz * dz
+        turn = ux * (my * dz - mz * dy) + uy * (mz * dx - mx * dz) + uz * (mx * dy - my * dx)
+        turn /= max(1.0 - along * along, MIN_HORIZONTAL)
+        ex += turn * ux
+        ey += turn * uy
+        ez += turn * uz
         note(w, D_MAG, mx - dx, my - dy, mz - dz, s.ACCEPTED)
     x[BG] -= p[P_KI] * ex * dt
     x[BG + 1] -= p[P_KI] * ey * dt

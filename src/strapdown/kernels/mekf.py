@@ -25,14 +25,15 @@ from strapdown.kernels.memory import (
     STATUS,
     STD_ATT,
     STD_BG,
+    TILT,
     W_HEAD,
-    WIDEN,
     Q,
     T,
     advance_attitude,
     begin,
     field_in_body,
     heading_from_mag,
+    level,
     load,
     note,
     note_sigma,
@@ -45,7 +46,8 @@ from strapdown.kernels.quat import dcm, down_in_body, exp
 # --- own states of x -------------------------------------------------------------------
 T_ACC = HEAD  # time of the last accelerometer update [s]
 T_MAG = HEAD + 1  # time of the last field update [s]
-X_SIZE = HEAD + 2
+STARTED = HEAD + 2  # 1 once tilt is known
+X_SIZE = HEAD + 3
 
 # --- own parameters ------------------------------------------------------------------------
 P_GYR_NOISE = P_HEAD  # [rad/s/sqrt(Hz)]
@@ -194,7 +196,7 @@ def update_heading(
 
     ``m = d + d x dtheta_b`` across the heading only: along it and in dip the measured field
     agrees with its reference by construction, which tells nothing. An error of tilt shows as one
-    of heading too; the row knows. Diagnostics: the second component is the one to the east.
+    of heading too; the row knows. Diagnostics: one component, to the magnetic east.
     """
     # fmt: on
     ex, ey, ez = uy * dz - uz * dy, uz * dx - ux * dz, ux * dy - uy * dx
@@ -203,7 +205,7 @@ def update_heading(
     hx, hy, hz = dy * ez - dz * ey, dz * ex - dx * ez, dx * ey - dy * ex
     left, expected, accepted = update_scalar(P, w, hx, hy, hz, h * angle, r, gate)
     note(w, D_MAG, nan, nan, nan, s.ACCEPTED if accepted else s.REJECTED_GATE)
-    note_sigma(w, D_MAG, 1, left, expected)
+    note_sigma(w, D_MAG, 0, left, expected)
     return accepted
 
 
@@ -230,6 +232,63 @@ def reset_attitude(x: Vec, P: Mat, p: Vec) -> None:
     P[1, 0] = P[0, 1]
     P[2, 0] = P[0, 2]
     P[2, 1] = P[1, 2]
+
+
+@kernel
+def reset_heading(x: Vec, P: Mat, variance: float) -> None:
+    """Make the heading's error independent, with this variance; tilt and bias keep their own."""
+    d0, d1, d2 = down_in_body(x[Q], x[Q + 1], x[Q + 2], x[Q + 3])
+    for j in range(6):  # P <- (I - d d^T) P, on the rows of dtheta
+        along = d0 * P[0, j] + d1 * P[1, j] + d2 * P[2, j]
+        P[0, j] -= d0 * along
+        P[1, j] -= d1 * along
+        P[2, j] -= d2 * along
+    for i in range(6):  # P <- P (I - d d^T), on its columns
+        along = P[i, 0] * d0 + P[i, 1] * d1 + P[i, 2] * d2
+        P[i, 0] -= along * d0
+        P[i, 1] -= along * d1
+        P[i, 2] -= along * d2
+    P[0, 0] += variance * d0 * d0
+    P[1, 1] += variance * d1 * d1
+    P[2, 2] += variance * d2 * d2
+    P[1, 0] += variance * d0 * d1
+    P[2, 0] += variance * d0 * d2
+    P[2, 1] += variance * d1 * d2
+    P[0, 1] = P[1, 0]
+    P[0, 2] = P[2, 0]
+    P[1, 2] = P[2, 1]
+
+
+# fmt: off
+@kernel
+def bridge_gap(
+    x: Vec, P: Mat, p: Vec, dt: float, has_acc: bool, ax: float, ay: float, az: float
+) -> None:
+    """Widen the covariance over a gap; where tilt is lost, level again and wait for a field.
+
+    One sample of the accelerometer then knows tilt better, and a linear update would not bear
+    the size of the error.
+    """
+    # fmt: on
+    unknown = min(p[P_GAP_RATE] * dt, pi)
+    if unknown > p[P_STD_TILT] and has_acc:
+        dx, dy, dz = down_in_body(x[Q], x[Q + 1], x[Q + 2], x[Q + 3])
+        heading = dx * (P[0, 0] * dx + P[0, 1] * dy + P[0, 2] * dz)
+        heading += dy * (P[1, 0] * dx + P[1, 1] * dy + P[1, 2] * dz)
+        heading += dz * (P[2, 0] * dx + P[2, 1] * dy + P[2, 2] * dz)
+        level(x, ax, ay, az)
+        reset_attitude(x, P, p)
+        # Of one sample, which is thereby used: it stands for the longest interval that counts.
+        tilt = p[P_ACC_NOISE] * p[P_ACC_NOISE] / (p[P_GRAVITY] * p[P_GRAVITY] * p[P_MAX_GAP])
+        for i in range(3):
+            P[i, i] += max(0.0, tilt - p[P_STD_TILT] * p[P_STD_TILT])
+        x[T_ACC] = x[T]
+        reset_heading(x, P, min(heading + unknown * unknown, pi * pi))
+        if x[ALIGNED] == FULL:
+            x[ALIGNED] = TILT
+    else:
+        for i in range(3):
+            P[i, i] += unknown * unknown
 
 
 @kernel
@@ -274,21 +333,27 @@ def step(
         return
     rx, ry, rz = (wx - x[BG]) * dt, (wy - x[BG + 1]) * dt, (wz - x[BG + 2]) * dt
     advance_attitude(x, rx, ry, rz)
-    if todo == START:
-        reset_attitude(x, P, p)
+    if x[STARTED] == 0.0:
+        x[STARTED] = 1.0
         x[T_ACC] = x[T]
         x[T_MAG] = x[T]
-        write_std(x, P)
-        return
-    if dt == 0.0:  # the first sample of a given attitude: no interval, nothing to weigh by
-        x[T_ACC] = x[T]
-        x[T_MAG] = x[T]
+        if todo == START:  # not so if the attitude was given
+            reset_attitude(x, P, p)
+            write_std(x, P)
+            return
     q_theta = p[P_GYR_NOISE] * p[P_GYR_NOISE] * dt
-    if todo == WIDEN or (int(x[STATUS]) & s.SATURATED) != 0:
+    if (int(x[STATUS]) & s.SATURATED) != 0:
         unknown = p[P_GAP_RATE] * dt
         q_theta += min(unknown * unknown, pi * pi)
     transition(w, rx, ry, rz, dt)
     predict(P, w, q_theta, p[P_BIAS_NOISE] * p[P_BIAS_NOISE] * dt)
+    if (int(x[STATUS]) & s.GAP) != 0:
+        bridge_gap(x, P, p, dt, has_acc, ax, ay, az)
+    if todo == START:  # the first field, or the first after a gap, has just set the heading
+        reset_heading(x, P, p[P_STD_HEADING] * p[P_STD_HEADING])
+        x[T_MAG] = x[T]
+        write_std(x, P)
+        return
 
     for i in range(6):
         w[W_DX + i] = 0.0
@@ -302,6 +367,8 @@ def step(
         if not update_direction(P, w, dx, dy, dz, k * ax, k * ay, k * az, r, p[P_GATE]):
             set_status(x, s.ACC_REJECTED)
         x[T_ACC] = t
+    if (int(x[STATUS]) & s.MAG_DISTURBED) != 0 and not has_mag:
+        x[T_MAG] = t  # the next one does not stand for the time of those left out
     if has_mag and t > x[T_MAG]:
         mx, my, mz = x[MAG + 1], x[MAG + 2], x[MAG + 3]
         k = 1.0 / sqrt(mx * mx + my * my + mz * mz)

@@ -35,7 +35,13 @@ GNSS = 51  # inbox: fresh?, t, lla, v_n, std_position_n, std_velocity_n, heading
 BARO = 66  # inbox: fresh?, pressure [Pa]: 2
 SPEED = 68  # inbox: fresh?, forward speed [m/s]: 2
 AIRSPEED = 70  # inbox: fresh?, airspeed [m/s]: 2
-HEAD = 72
+T_FIELD = 72  # time of the last valid field [s]
+FIELD = 73  # usual horizontal part of the field and its part down [T], zeros before: 2
+FIELD_NEW = 75  # the same of a disturbed field that may become usual: 2
+FIELD_HELD = 77  # how long it has stayed the same [s]
+FIELD_WAIT = 78  # how long the field must still be as usual to be trusted [s]
+AHEAD = 79  # how far the attitude is carried on by a held rate [s]
+HEAD = 80
 
 # --- how far alignment is -----------------------------------------------------------------
 NO = 0.0
@@ -51,7 +57,8 @@ P_SIN_D = 3
 P_GYR_RANGE = 4  # [rad/s]
 P_ACC_RANGE = 5  # [m/s^2]
 P_REALIGN = 6  # 1: after a gap align again; 0: the filter widens its covariance
-P_HEAD = 7
+P_REJECT = 7  # 1: a field that is not as usual is not used
+P_HEAD = 8
 
 # --- head of w: diagnostics ---------------------------------------------------------------
 D_ACC = 0  # innovation 3, sigma 3, outcome
@@ -70,6 +77,13 @@ MIN_ACC2 = 1e-12  # (10^-6 m/s^2)^2
 MAX_ACC2 = 1e10  # (10^5 m/s^2)^2
 MIN_MAG2 = 1e-24  # (10^-12 T)^2
 MAX_MAG2 = 1e4  # (100 T)^2
+
+# The usual field; `P_REJECT` says whether more than a flag comes of it.
+FIELD_OFF = 0.2  # so far off, relative, it is disturbed: a fifth of its strength, or 11 deg of dip
+FIELD_TIME = 10.0  # time constant of the usual field while nothing disturbs [s]
+FIELD_STEADY = 30.0  # a disturbed field that stays the same for so long becomes usual [s]
+FIELD_AGAIN = 1.0  # after a disturbance it must be as usual for so long [s]
+FIELD_MISSING = 5.0  # without a valid sample for so long the field is missing [s]
 
 
 @inlined_kernel
@@ -191,7 +205,7 @@ def turn_heading(x: Vec, angle: float) -> None:
 
 
 @kernel
-def _level(x: Vec, ax: float, ay: float, az: float) -> None:
+def level(x: Vec, ax: float, ay: float, az: float) -> None:
     """Turn the attitude the short way until the specific force points up."""
     fx, fy, fz = rotate(x[Q], x[Q + 1], x[Q + 2], x[Q + 3], ax, ay, az)
     cw, cx, cy, cz = from_two_vectors(fx, fy, fz, 0.0, 0.0, -1.0)
@@ -211,6 +225,56 @@ def note(w: Vec, cell: int, ix: float, iy: float, iz: float, outcome: int) -> No
     w[cell + 6] = outcome
 
 
+@kernel
+def watch_field(x: Vec, t: float, has_mag: bool) -> int:
+    """Compare strength and dip of the field in the inbox with the usual ones; returns flags."""
+    h, d = x[FIELD], x[FIELD + 1]
+    bits = 0
+    if not has_mag:
+        if h + abs(d) > 0.0 and t - x[T_FIELD] > FIELD_MISSING:
+            bits = s.MAG_MISSING
+        return bits
+    mx, my, mz = rotate(
+        x[Q], x[Q + 1], x[Q + 2], x[Q + 3], x[MAG + 1], x[MAG + 2], x[MAG + 3]
+    )
+    mh = sqrt(mx * mx + my * my)
+    dt = min(t - x[T_FIELD], 1.0)
+    x[T_FIELD] = t
+    if h + abs(d) == 0.0:
+        x[FIELD], x[FIELD + 1] = mh, mz
+        return bits
+    k = dt / (FIELD_TIME + dt)
+    if not _differs(mh, mz, h, d):
+        x[FIELD_HELD] = 0.0
+        if x[FIELD_WAIT] > 0.0:
+            x[FIELD_WAIT] -= dt
+            bits = s.MAG_DISTURBED
+        else:
+            x[FIELD] += k * (mh - h)
+            x[FIELD + 1] += k * (mz - d)
+        return bits
+    x[FIELD_WAIT] = FIELD_AGAIN
+    h, d = x[FIELD_NEW], x[FIELD_NEW + 1]
+    if x[FIELD_HELD] == 0.0 or _differs(mh, mz, h, d):
+        x[FIELD_NEW], x[FIELD_NEW + 1] = mh, mz
+        x[FIELD_HELD] = 1e-9  # it has begun
+    else:
+        x[FIELD_NEW] += k * (mh - h)
+        x[FIELD_NEW + 1] += k * (mz - d)
+        x[FIELD_HELD] += dt
+        if x[FIELD_HELD] > FIELD_STEADY:
+            x[FIELD], x[FIELD + 1] = x[FIELD_NEW], x[FIELD_NEW + 1]
+            x[FIELD_HELD] = 0.0
+    return s.MAG_DISTURBED
+
+
+@inlined_kernel
+def _differs(mh: float, md: float, h: float, d: float) -> bool:
+    """Whether a field is off another in strength or dip."""
+    dh, dd = mh - h, md - d
+    return dh * dh + dd * dd > FIELD_OFF * FIELD_OFF * (h * h + d * d)
+
+
 # fmt: off
 @inlined_kernel
 def begin(
@@ -221,7 +285,8 @@ def begin(
     """Judge a sample, keep the time, align; tells the filter what to do with it.
 
     Returns one of SKIP, START, GO, WIDEN; the interval dt; the mean rate over it; and whether
-    accelerometer and magnetometer may be used. An accelerometer sample of inf is absent.
+    accelerometer and magnetometer may be used. A sample of inf is absent: the last rate is held
+    until the next one, which stands for all the time since the last and puts that right.
     """
     # fmt: on
     bits = 0
@@ -247,6 +312,11 @@ def begin(
             bits |= s.MAG_INVALID
             note(w, D_MAG, nan, nan, nan, s.REJECTED_INVALID)
 
+    absent = isinf(gx)
+    if absent:
+        gx, gy, gz = x[OMEGA], x[OMEGA + 1], x[OMEGA + 2]
+        if x[AHEAD] > p[P_MAX_GAP]:  # too long to hold a rate
+            gx = nan
     if not gx * gx + gy * gy + gz * gz < MAX_RATE2 or (not t > x[T] and not isnan(x[T])):
         # No rate: the next valid sample integrates over this one. The field waits in the inbox.
         bits |= s.GYR_INVALID
@@ -255,6 +325,11 @@ def begin(
         x[STATUS] = float(bits)
         return SKIP, 0.0, 0.0, 0.0, 0.0, False, False
     x[MAG] = 0.0
+    if x[ALIGNED] != NO:
+        bits |= watch_field(x, t, has_mag)
+    if has_mag and (bits & s.MAG_DISTURBED) != 0 and p[P_REJECT] > 0.0:
+        has_mag = False
+        note(w, D_MAG, nan, nan, nan, s.REJECTED_DISTURBED)
     if abs(gx) >= p[P_GYR_RANGE] or abs(gy) >= p[P_GYR_RANGE] or abs(gz) >= p[P_GYR_RANGE]:
         bits |= s.SATURATED
 
@@ -271,11 +346,17 @@ def begin(
             x[DT] = dt
         else:  # a mean, so that jitter does not pass for samples that are missing
             x[DT] = usual + 0.02 * (min(dt, 2.0 * usual) - usual)
-        if 0.0 < 1.5 * usual < dt:  # samples are missing: their rate is the mean of the two
+        if x[AHEAD] > 0.0 and not absent:  # the rate of all the time since the last one
+            ahead = x[AHEAD] / dt
+            wx += ahead * (gx - x[OMEGA])
+            wy += ahead * (gy - x[OMEGA + 1])
+            wz += ahead * (gz - x[OMEGA + 2])
+        elif 0.0 < 1.5 * usual < dt:  # samples are missing: their rate is the mean of the two
             missed = 0.5 * (dt - usual) / dt
             wx += missed * (x[OMEGA] - gx)
             wy += missed * (x[OMEGA + 1] - gy)
             wz += missed * (x[OMEGA + 2] - gz)
+    x[AHEAD] = x[AHEAD] + dt if absent else 0.0
     x[T] = t
     x[OMEGA] = gx
     x[OMEGA + 1] = gy
@@ -291,7 +372,7 @@ def begin(
         todo = START
         dt = 0.0
         if has_acc:
-            _level(x, ax, ay, az)
+            level(x, ax, ay, az)
         if x[ALIGNED] == FULL:
             x[ALIGNED] = TILT
     if x[ALIGNED] == TILT and has_mag:

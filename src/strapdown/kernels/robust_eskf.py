@@ -271,6 +271,9 @@ def step(
         if x[STARTED] > 0.0:
             _publish(x, P, p, 0.0, 0.0, 0.0, 0.0, 0.0)
         return
+    new_rate = not isinf(gx)
+    if not new_rate:
+        gx, gy, gz = wx, wy, wz
     held = isinf(ax) and x[HAS_HELD] > 0.0  # no sample, as against a bad one
     if has_acc:
         x[ACC_HELD], x[ACC_HELD + 1], x[ACC_HELD + 2] = ax, ay, az
@@ -335,7 +338,7 @@ def step(
     missing = dt - x[DT]
     if missing > 0.5 * x[DT]:  # variance of a random walk of the rate between its two ends
         x[EXTRA] += p[P_RATE_WALK] * p[P_RATE_WALK] * missing * missing * missing / 12.0
-    if _is_clipped(x, p, gx, gy, gz):  # the rate may be much higher
+    if new_rate and _is_clipped(x, p, gx, gy, gz):  # the rate may be much higher
         x[EXTRA] += CLIPPED_TIME * dt * (gx * gx + gy * gy + gz * gz)
         set_status(x, s.SATURATED)
 

@@ -12,6 +12,7 @@ REST = 256
 SATURATED = 512
 MAG_DISTURBED = 1024
 OUTAGE = 2048
+MAG_MISSING = 4096
 
 # What became of a measurement, in the diagnostics.
 NOT_MEASURED = 0

@@ -1,0 +1,141 @@
+"""What all filters share: noticing a disturbed or missing field, and holding a slower rate."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+from truth import hand
+from truth.kernel_step import feed, quat, rotation, scalar_first, start
+
+from strapdown.attitude import GyroIntegration, Mahony, Mekf
+from strapdown.kernels import memory as m
+from strapdown.kernels import status as s
+
+G = 9.80665
+R_NB = Rotation.from_euler("ZYX", [1.0, -0.4, 2.5])
+ACC = R_NB.inv().apply([0.0, 0.0, -G])
+DT = 0.1
+
+
+def watched(fields_n, flt=None, dt=DT):
+    """Status words of a box at rest that sees one field after another; None: no sample."""
+    flt = flt or Mahony(kp=0.1, ki=0.0)
+    x, P = start(flt, scalar_first(R_NB))
+    words = []
+    for k, field in enumerate(fields_n):
+        mag = np.empty(0) if field is None else R_NB.inv().apply(field)
+        feed(flt, x, P, (k + 1) * dt, np.zeros(3), ACC, mag)
+        words.append(int(x[m.STATUS]))
+    return np.array(words), x
+
+
+def tilted(dip):
+    """The field of the tests at another dip [deg]."""
+    size, a = np.linalg.norm(hand.FIELD_N), np.radians(dip)
+    return size * np.array([np.cos(a), 0.0, np.sin(a)])
+
+
+@pytest.mark.parametrize(
+    ("field", "flag"),
+    [
+        (1.19 * hand.FIELD_N, 0),
+        (1.21 * hand.FIELD_N, s.MAG_DISTURBED),
+        (0.79 * hand.FIELD_N, s.MAG_DISTURBED),
+        (tilted(63.97 - 11.4), 0),  # 2 asin(0.1) = 11.48 deg about the dip of 63.97 deg
+        (tilted(63.97 - 11.6), s.MAG_DISTURBED),
+        (tilted(63.97 + 11.6), s.MAG_DISTURBED),
+        (Rotation.from_euler("z", 0.05).apply(hand.FIELD_N), 0),  # heading is no criterion
+    ],
+)
+def test_field_off_in_strength_or_dip_is_flagged(field, flag):
+    words, _ = watched([hand.FIELD_N] * 5 + [field])
+    assert not words[:5].any()
+    assert words[5] == flag
+
+
+def test_disturbed_field_is_not_learnt_and_must_be_as_usual_for_a_second():
+    words, x = watched([hand.FIELD_N] * 10 + [2.0 * hand.FIELD_N] * 100 + [hand.FIELD_N] * 30)
+    flagged = np.flatnonzero(words & s.MAG_DISTURBED)
+    assert flagged.tolist() == list(range(10, 110 + 10))
+    np.testing.assert_allclose(x[m.FIELD : m.FIELD + 2], hand.FIELD_N[[0, 2]], rtol=1e-12)
+
+
+def test_disturbed_field_that_stays_the_same_becomes_usual_after_half_a_minute():
+    words, _ = watched([hand.FIELD_N] * 10 + [2.0 * hand.FIELD_N] * 400)
+    flagged = np.flatnonzero(words & s.MAG_DISTURBED)
+    # 300 intervals, and the second of waiting after it
+    assert flagged[0] == 10
+    assert flagged[-1] == pytest.approx(10 + 300 + 10, abs=2)
+    changing = [(2.0 + k // 100) * hand.FIELD_N for k in range(400)]  # never the same for 30 s
+    words, _ = watched([hand.FIELD_N] * 10 + changing)
+    assert (words[10:] & s.MAG_DISTURBED).all()
+
+
+def test_slow_changes_of_the_field_are_followed():
+    ramp = [(1.0 + 0.01 * k * DT) * hand.FIELD_N for k in range(600)]  # 60 % in a minute
+    words, _ = watched(ramp)
+    assert not (words & s.MAG_DISTURBED).any()
+
+
+def test_field_is_missing_five_seconds_after_the_last_valid_one():
+    gone = [None] * 40 + [np.full(3, np.nan)] * 40
+    words, _ = watched([hand.FIELD_N] * 10 + gone + [hand.FIELD_N] * 5)
+    missing = np.flatnonzero(words & s.MAG_MISSING)
+    assert missing.tolist() == list(range(9 + 51, 90))
+
+
+def test_a_field_that_never_came_is_not_missing():
+    words, _ = watched([None] * 200)
+    assert not words.any()
+
+
+@pytest.mark.parametrize("reject", [True, False])
+def test_rejection_is_a_parameter_and_stands_in_the_diagnostics(reject):
+    flt = Mahony(kp=1.0, ki=0.0, reject_disturbed=reject)
+    x, P = start(flt, scalar_first(R_NB))
+    wrong = 2.0 * Rotation.from_euler("z", 0.5).apply(hand.FIELD_N)
+    for k in range(30):
+        field = hand.FIELD_N if k < 10 else wrong
+        w = feed(flt, x, P, (k + 1) * DT, np.zeros(3), ACC, R_NB.inv().apply(field))
+    turned = (rotation(quat(x)) * R_NB.inv()).magnitude()
+    assert w[m.D_MAG + 6] == (s.REJECTED_DISTURBED if reject else s.ACCEPTED)
+    assert (turned < 1e-12) == reject
+
+
+# --- a gyroscope slower than the accelerometer -------------------------------------------
+
+
+@pytest.mark.parametrize("flt", [GyroIntegration(), Mahony(kp=1e-9, ki=0.0), Mekf()])
+def test_absent_rates_are_held_and_put_right_by_the_next(flt):
+    """Rates at 25 Hz on an axis of 100 Hz: at each real sample as if the others were not there."""
+    x, P = start(flt, scalar_first(R_NB))
+    want, dt = R_NB, 0.01
+    rates = np.random.default_rng(3).standard_normal((20, 3))
+    rates[0] = 0.0
+    for k in range(1, len(rates)):
+        for part in (1, 2, 3):
+            feed(flt, x, P, (4 * (k - 1) + part) * dt, np.full(3, np.inf), np.full(3, np.inf))
+            held = want * Rotation.from_rotvec(part * dt * rates[k - 1])
+            assert (rotation(quat(x)) * held.inv()).magnitude() < 1e-12
+            assert int(x[m.STATUS]) == 0
+        feed(flt, x, P, 4 * k * dt, rates[k], np.full(3, np.inf))
+        # The held turn, undone and made anew, is one about another axis: order of (rate dt)^2.
+        want = want * Rotation.from_rotvec(4 * dt * rates[k])
+        off = (rotation(quat(x)) * want.inv()).magnitude()
+        sizes = np.linalg.norm(rates[k]) * np.linalg.norm(rates[k - 1])
+        assert off <= 0.5 * (4 * dt) ** 2 * sizes
+        want = rotation(quat(x))
+
+
+def test_a_rate_is_not_held_for_longer_than_a_gap():
+    flt = GyroIntegration(max_gap=0.5)
+    x, P = start(flt, scalar_first(R_NB))
+    feed(flt, x, P, 1e-3, np.array([0.1, 0.2, 0.3]), ACC)
+    words = []
+    for k in range(1, 100):
+        feed(flt, x, P, 0.01 * k, np.full(3, np.inf), ACC)
+        words.append(int(x[m.STATUS]))
+    invalid = np.flatnonzero(np.array(words) & s.GYR_INVALID)
+    assert invalid[0] == pytest.approx(50, abs=1)
+    assert len(invalid) == len(words) - invalid[0]
+    feed(flt, x, P, 2.0, np.zeros(3), ACC)
+    assert int(x[m.STATUS]) == s.GAP

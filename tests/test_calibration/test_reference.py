@@ -212,6 +212,19 @@ def test_gyro_calibration_against_encoders_brings_the_errors_down_to_the_noise()
     assert record.residual_rms_before / DPS > 2.0
 
 
+def test_a_long_rest_leaves_the_rates_of_the_motion_as_they_are():
+    """Counts that stand still do not scatter: what they leave must not coarsen the rest."""
+    t, rpy, _ = platform(25.0)
+    # held where it stands at the end, so there is no jump
+    long = np.vstack((rpy, np.tile(rpy[-1], (10 * len(t), 1))))
+    t_long = np.arange(len(long)) / 100.0
+    short = cal.body_rates(t, np.round(rpy / LSB) * LSB, resolution=LSB)
+    found = cal.body_rates(t_long, np.round(long / LSB) * LSB, resolution=LSB)
+    inner = slice(100, len(t) - 300)  # the stop itself has no finite acceleration
+    off = np.sqrt(np.mean((found[: len(t)] - short)[inner] ** 2))
+    assert off < 0.03 * DPS  # the spline itself is good to 0.04 deg/s
+
+
 def test_an_angle_that_stands_has_no_rate():
     t = np.arange(200) / 100.0
     rpy = np.column_stack((np.full(200, 0.1), np.where(t % 0.3 < 0.15, 0.0, LSB), t * 0.0))

@@ -23,6 +23,7 @@ from strapdown.rotation import dcm_from_rpy
 from strapdown.units import DEG
 
 HEDM5500_RESOLUTION = 0.09 * DEG  # as the thesis states it; see Quadrature.resolution
+LONGEST_COUNT = 1.0  # s; a count that stays longer is at rest
 # Place of state AB in the order 11, 10, 00, 01 of a turn in the positive sense; index 2 A + B.
 _ORDER = np.array([2, 3, 1, 0])
 
@@ -158,7 +159,18 @@ def smooth_angles(
         )
     if np.ptp(angle) <= resolution:  # one flickering count is no motion
         return BSpline(*splrep(t, np.full(len(t), angle.mean()), k=5, s=1.0))
-    return BSpline(*splrep(t, angle, k=5, s=len(t) * noise**2))
+    return BSpline(*splrep(t, angle, k=5, s=_moving(t, angle) * noise**2))
+
+
+def _moving(t: FloatArray, angle: FloatArray) -> float:
+    """Return how many samples were rounded while the angle moved.
+
+    A count that stands still for long is a rest: its rounding does not scatter, and what the
+    spline was allowed there it would take where the angle moves.
+    """
+    edges = np.concatenate(([0], np.flatnonzero(np.diff(angle)) + 1, [len(t)]))
+    longest = LONGEST_COUNT * (len(t) - 1) / (t[-1] - t[0])
+    return float(np.minimum(np.diff(edges), longest).sum())
 
 
 def body_rates(

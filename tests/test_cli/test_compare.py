@@ -26,7 +26,8 @@ def test_the_figures_are_those_of_run_and_evaluation(command, two_logs):
         ("madgwick", True), ("gyro", True),
     ] * 2  # fmt: skip
     rec = sd.read(two_logs[1])
-    sol = sd.attitude.Madgwick(beta=0.3).run(rec)
+    north = sd.attitude.declination(rec)
+    sol = sd.attitude.Madgwick(beta=0.3, declination=north).run(rec)
     expected = sd.evaluation.attitude_errors(sol, rec.reference).summary()
     assert found["trials"][2]["errors"]["total_rmse_deg"] == expected["total_rmse_deg"]
     each = [row["errors"]["total_rmse_deg"] for row in found["trials"] if row["filter"] == "gyro"]
@@ -74,3 +75,16 @@ def test_a_log_without_reference_says_so(command, tmp_path):
     done = command("compare", "bare.parquet", "--filters", "mekf")
     assert done.status == 2
     assert "must have a reference to compare with" in done.line
+
+
+def test_compare_and_run_agree_on_which_north_is_meant(command, tmp_path):
+    done = command("demo", "--seconds", "20", "--save", "demo.parquet", "--no-report", "-o", "own",
+                   "--filter", "madgwick", "--json")  # fmt: skip
+    assert done.status == 0, done.err
+    alone = json.loads(done.out)["errors"]
+    assert "declination" in done.err
+    done = command("compare", "demo.parquet", "--filters", "madgwick,gyro", "--json")
+    assert done.status == 0, done.err
+    assert done.err.count("declination") == 1
+    beside = json.loads(done.out)["trials"][0]["errors"]
+    assert beside["heading_rmse_deg"] == pytest.approx(alone["heading_rmse_deg"], rel=1e-9)

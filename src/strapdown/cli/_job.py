@@ -1,7 +1,7 @@
 """The main job: a recording in, a folder of results and a short table out."""
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -165,7 +165,7 @@ def _solution(
 
     with _errors.given(log):
         name = job.filter or estimators.preferred(rec)
-    flt = _to_true_north(_estimator(name, job), rec, progress)
+    flt = to_true_north({name: _estimator(name, job)}, rec, progress)[name]
     if job.smooth and not hasattr(flt, "smooth"):
         raise InputError(f"{name} has no offline twin; leave --smooth out, or choose another.")
     tracks = [kind for kind in job.exports if kind != "csv"]
@@ -206,18 +206,40 @@ def _outages_of(job: Job, log: str, sol: "Solution", rec: "Recording") -> "tuple
         return outage_errors(sol, rec, job.outages, name=Path(log).name)
 
 
-def _to_true_north(flt: Any, rec: "Recording", progress: _console.Progress) -> Any:
-    """Return the estimator with the declination of the recording's place and date, if known."""
-    if getattr(flt, "declination", 0.0) is not None or rec.mag is None or not flt.use_mag:
-        return flt
+def to_true_north(
+    estimators: Mapping[str, Any], rec: "Recording", progress: _console.Progress
+) -> dict[str, Any]:
+    """Return estimators with the declination of the recording's place and date, if known.
+
+    Parameters
+    ----------
+    estimators : mapping of str to Estimator
+        Those without a declination, or that were given one, stay as they are.
+    rec : Recording
+        What they are to run on.
+    progress : Progress
+        Told what was found.
+
+    Returns
+    -------
+    dict
+    """
+    found = dict(estimators)
+    unset = [
+        label
+        for label, flt in found.items()
+        if getattr(flt, "declination", 0.0) is None and flt.use_mag
+    ]
+    if rec.mag is None or not unset:
+        return found
     from strapdown.attitude import declination
     from strapdown.units import DEG
 
     angle = declination(rec)
-    if angle is None:
-        return flt
-    progress.note(f"heading is from true north: declination {angle / DEG:.2f} deg east.")
-    return replace(flt, declination=angle)
+    if angle is not None:
+        progress.note(f"heading is from true north: declination {angle / DEG:.2f} deg east.")
+        found |= {label: replace(found[label], declination=angle) for label in unset}
+    return found
 
 
 def _errors_of(

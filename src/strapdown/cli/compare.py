@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from strapdown.cli import _console, _errors, _options, _settings
+from strapdown.cli import _console, _errors, _job, _options, _settings
 from strapdown.errors import InputError
 
 if TYPE_CHECKING:
@@ -56,6 +56,7 @@ def compare(
             progress.step(f"reading {log}")
             rec = source.read()
             estimators = wanted if wanted is not None else _fitting(rec)
+            estimators = _job.to_true_north(estimators, rec, progress)
             progress.step(f"{', '.join(estimators)} on {log}")
             with _errors.given(log):
                 table += evaluation.trials(rec, log, estimators, smooth=smooth)

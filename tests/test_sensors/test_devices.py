@@ -332,6 +332,9 @@ def test_adis16405_has_the_printed_figures():
     assert box.gyr.spread.misalignment == pytest.approx(0.5 * DEG)
     assert box.mag.digital.lsb == pytest.approx(0.5e-3 * GAUSS)
     assert box.temperature.digital.from_counts([100]) == pytest.approx([39.0])
+    # ADIS16350: 6.88 counts per degree, zero at 25 degC (6.3.1)
+    old = sensors.preset("adis16350").temperature.digital
+    assert old.from_counts([0, 688]) == pytest.approx([25.0, 125.0])
 
 
 def test_spread_of_individuals_keeps_to_the_datasheet():
@@ -341,7 +344,24 @@ def test_spread_of_individuals_keeps_to_the_datasheet():
     scale = np.array([np.diag(p.matrix) for p in parts])
     assert 0.009 < np.abs(scale - 1.0).max() < 0.0101  # 0.0495 to 0.0505 of 0.05
     off = np.array([np.array(p.matrix)[0, 1] for p in parts])
-    assert np.abs(off).max() < 0.5 * DEG * 1.01
+    assert 0.47 * DEG < np.abs(off).max() < 0.5 * DEG * 1.01
+    rows = np.array([p.matrix for p in parts])
+    rows = rows / np.linalg.norm(rows, axis=2, keepdims=True)
+    for i, j in ((0, 1), (1, 2), (2, 0)):  # 0.05 deg from axis to axis
+        between = np.degrees(np.arccos(np.sum(rows[:, i] * rows[:, j], axis=1))) - 90.0
+        assert 0.045 < np.abs(between).max() < 0.0501
+
+
+def test_axes_that_are_turned_on_their_own_are_not_orthogonal():
+    gyr = sensors.Gyro(spread=sensors.Spread(misalignment=0.01))
+    rows = np.array([gyr.individual(np.random.default_rng(k)).linear.matrix for k in range(300)])
+    between = np.abs(np.einsum("kj,kj->k", rows[:, 0], rows[:, 1]))
+    assert 0.015 < between.max() < 0.0201  # both may turn by all of it
+
+
+def test_axes_cannot_be_less_orthogonal_than_they_are_turned():
+    with pytest.raises(ValueError, match=r"`non_orthogonality` must lie in \[0, 0.02\], got 0.03"):
+        sensors.Spread(misalignment=0.01, non_orthogonality=0.03)
 
 
 def test_noise_parameters_are_ready_for_an_estimator():

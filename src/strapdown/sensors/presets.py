@@ -217,7 +217,7 @@ def _adis16350(sheet: Datasheet) -> Device:
         ),
         temperature=Thermometer(
             sampling=Sampling(rate=1.0),
-            digital=Digital(lsb=1.0 / sheet.value("temperature", "scale factor"), zero=25.0),
+            digital=Digital(lsb=sheet.value("temperature", "scale factor"), zero=25.0),
         ),
         datasheet=sheet,
         assumed=(
@@ -254,6 +254,7 @@ def _adis16405(sheet: Datasheet) -> Device:
             spread=Spread(
                 scale=_tolerance(sheet, "mag"),
                 misalignment=sheet.value("mag", "misalignment"),
+                non_orthogonality=_between_axes(sheet, "mag"),
                 bias=sheet.value("mag", "initial bias error"),
                 nonlinearity=sheet.value("mag", "non-linearity"),
             ),
@@ -301,6 +302,7 @@ def _adis_inertial(sheet: Datasheet, part: str) -> tuple[Gyro, Accelerometer]:
         spread=Spread(
             scale=_tolerance(sheet, "gyr"),
             misalignment=sheet.values("gyr", "misalignment")[-1],
+            non_orthogonality=_between_axes(sheet, "gyr"),
             nonlinearity=sheet.value("gyr", "non-linearity"),
         ),
     ), Accelerometer(
@@ -312,6 +314,7 @@ def _adis_inertial(sheet: Datasheet, part: str) -> tuple[Gyro, Accelerometer]:
         spread=Spread(
             scale=_tolerance(sheet, "acc"),
             misalignment=sheet.values("acc", "misalignment")[-1],
+            non_orthogonality=_between_axes(sheet, "acc"),
             nonlinearity=sheet.value("acc", "non-linearity"),
         ),
     )
@@ -416,6 +419,14 @@ def _tolerance(sheet: Datasheet, sensor: str) -> float:
     if figure.least is None or figure.most is None or figure.typical is None:
         raise ValueError(f"the sensitivity of {sensor} of {sheet.name} must have its limits.")
     return max(figure.most - figure.typical, figure.typical - figure.least) / figure.typical
+
+
+def _between_axes(sheet: Datasheet, sensor: str) -> float:
+    """Return how far the axes are from orthogonal; one sheet calls it a misalignment."""
+    quantities = {figure.quantity for figure in sheet.figures if figure.sensor == sensor}
+    if "axis non-orthogonality" in quantities:
+        return sheet.value(sensor, "axis non-orthogonality")
+    return sheet.value(sensor, "misalignment", "axis to axis")
 
 
 def _triple(values: tuple[float, ...]) -> Triple:

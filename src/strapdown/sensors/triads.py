@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from strapdown import _checks
 from strapdown._types import FloatArray
 from strapdown.recording import Mag
-from strapdown.rotation import dcm_from_quat
+from strapdown.rotation import dcm_from_quat, dcm_from_rotvec
 from strapdown.sensors.digital import Digital
 from strapdown.sensors.linear import ZERO, Linear, Matrix
 from strapdown.sensors.noise import Noise
@@ -52,6 +52,9 @@ class Spread:
         Scale factors lie within this of the nominal one, evenly [1].
     misalignment : float
         Each axis is turned by up to this against the case, evenly [rad].
+    non_orthogonality : float
+        Angles between the axes lie within this of 90 deg, evenly [rad]: the axes are turned
+        together, and by so much against each other. Infinite turns each on its own.
     bias : float
         Standard deviation of the constant bias [SI].
     nonlinearity : float
@@ -61,6 +64,7 @@ class Spread:
 
     scale: float = 0.0
     misalignment: Annotated[float, Quantity("angle")] = 0.0
+    non_orthogonality: Annotated[float, Quantity("angle")] = math.inf
     bias: Annotated[float, Quantity("@value")] = 0.0
     nonlinearity: float = 0.0
 
@@ -68,6 +72,30 @@ class Spread:
         """Check that nothing is negative."""
         for name in ("scale", "misalignment", "bias", "nonlinearity"):
             _checks.positive(name, getattr(self, name), allow_zero=True)
+        if self.non_orthogonality != math.inf:
+            limit = 2.0 * self.misalignment
+            _checks.in_range("non_orthogonality", self.non_orthogonality, 0.0, limit)
+
+    def axes(self, rng: np.random.Generator) -> FloatArray:
+        """Return the sensitive axes of one part in its case, as rows, shape (3, 3).
+
+        Parameters
+        ----------
+        rng : numpy.random.Generator
+            Source of the randomness.
+
+        Returns
+        -------
+        ndarray, shape (3, 3)
+        """
+        off = rng.uniform(-1.0, 1.0, (3, 3)) * (1.0 - np.eye(3))
+        if self.non_orthogonality == math.inf:
+            return np.asarray(np.eye(3) + self.misalignment * off)
+        # half of an angle between two axes is each one's: that much less turns all of them
+        half = 0.5 * self.non_orthogonality
+        together = (self.misalignment - half) * off[[2, 0, 1], [1, 2, 0]]
+        apart = half * (np.triu(off) + np.triu(off).T)
+        return np.asarray((np.eye(3) + apart) @ dcm_from_rotvec(together))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -124,7 +152,7 @@ class Triad:
         """
         s = self.spread
         scale = 1.0 + s.scale * rng.uniform(-1.0, 1.0, 3)
-        axes = np.eye(3) + s.misalignment * rng.uniform(-1.0, 1.0, (3, 3)) * (1.0 - np.eye(3))
+        axes = s.axes(rng)
         bias = np.array(self.linear.bias) + s.bias * rng.standard_normal(3)
         share = 2.0 * s.nonlinearity * rng.uniform(-1.0, 1.0, 3)
         quadratic = np.array(self.linear.quadratic)

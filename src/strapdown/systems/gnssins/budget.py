@@ -226,9 +226,10 @@ def _drift(runs: dict[str, Run]) -> list[Row]:
 def _powers(runs: dict[str, Run]) -> list[Row]:
     """Return the rows of how the errors grow."""
     remark = "slope in log-log axes, 10 s to 100 s; curvature of the Earth within 0.01"
+    near = Tolerance(absolute=0.01)
     return [
         compared(f"6.1, position error from the {sensor}, power of time", power,
-                 slope(runs[name].t, runs[name].here, 10.0, SPAN), "1", Tolerance(absolute=0.01), remark)
+                 slope(runs[name].t, runs[name].here, 10.0, SPAN), "1", near, remark)
         for sensor, power, name in (
             ("gyroscopes", 3.0, "db0g, gyro bias of 0.015 deg/s"),
             ("accelerometers", 2.0, "db0a, accelerometer bias of 1 mg"),

@@ -11,14 +11,14 @@ from strapdown.rotation import quat_conj, quat_from_rpy, quat_mul
 from strapdown.systems._parts import Part
 from strapdown.systems._rows import Row, Shown, Tolerance, compared, info, not_given, worded
 from strapdown.systems.platform import bench
-from strapdown.systems.platform.replay import CONVERGED_S, Replay, Test, replay, terrestrial
+from strapdown.systems.platform.replay import CONVERGED_S, Replay, Trial, replay, terrestrial
 from strapdown.units import DEG
 
 FACTORS: Final = (1.0, 2.0, 3.0, 5.0, 7.0, 10.0, 14.0, 20.0, 30.0, 50.0, 100.0)
 CHOSEN: Final = 20.0
 DROP: Final = 10.0  # beyond, the error drops drastically
 RUNS: Final = 3  # Monte Carlo analyses
-MOTION: Final = Test("k", 120.0, (4.00, 7.33, 8.09), (15.13, 21.41, 20.85), 115.0)  # table 9.1
+MOTION: Final = Trial("k", 120.0, (4.00, 7.33, 8.09), (15.13, 21.41, 20.85), 115.0)  # table 9.1
 
 
 def run(seed: int) -> Shown:

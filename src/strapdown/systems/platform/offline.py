@@ -14,7 +14,7 @@ from strapdown.systems.platform.replay import (
     CONVERGED_S,
     Errors,
     Replay,
-    Test,
+    Trial,
     errors,
     replay,
     space,
@@ -25,10 +25,10 @@ from strapdown.units import DEG, DPS
 REQUIRED: Final = 0.5  # deg and deg/s
 YAW_LIMIT_DEG: Final = 3.0  # of the terrestrial scenario, chapter 10
 TESTS: Final = (
-    Test("TEST 1", 180.0, (4.00, 7.33, 8.09), (15.13, 21.41, 20.85), 170.0),
-    Test("TEST 2", 180.0, (7.05, 8.56, 12.84), (27.49, 33.27, 40.53), 170.0),
-    Test("TEST 3", 180.0, (5.11, 5.50, 11.08), (20.19, 20.88, 39.69), 170.0),
-    Test("TEST 4", 600.0, (2.28, 2.27, 3.84), (16.77, 19.43, 23.87), 75.0),
+    Trial("TEST 1", 180.0, (4.00, 7.33, 8.09), (15.13, 21.41, 20.85), 170.0),
+    Trial("TEST 2", 180.0, (7.05, 8.56, 12.84), (27.49, 33.27, 40.53), 170.0),
+    Trial("TEST 3", 180.0, (5.11, 5.50, 11.08), (20.19, 20.88, 39.69), 170.0),
+    Trial("TEST 4", 600.0, (2.28, 2.27, 3.84), (16.77, 19.43, 23.87), 75.0),
 )
 # RMS of q1 q2 q3, of phi theta psi [deg], of the rates [deg/s]: tables 9.2 to 9.5.
 SPACE: Final = (
@@ -128,14 +128,14 @@ def scenario(log: Replay, name: str, *, systematic: bool = True) -> Ran:
 # --- rows ---------------------------------------------------------------------------------
 
 
-def motion_rows(table: str, test: Test, log: Replay) -> list[Row]:
+def motion_rows(table: str, test: Trial, log: Replay) -> list[Row]:
     """Return the rates of the simulated motion beside the printed ones.
 
     Parameters
     ----------
     table : str
         Number of the table.
-    test : Test
+    test : Trial
         The printed test.
     log : Replay
         The simulated one.
@@ -160,7 +160,7 @@ def motion_rows(table: str, test: Test, log: Replay) -> list[Row]:
 def error_rows(
     attitude: str,
     rates: str,
-    test: Test,
+    test: Trial,
     printed: tuple[tuple[float, float, float], ...],
     ran: Ran,
 ) -> list[Row]:
@@ -170,7 +170,7 @@ def error_rows(
     ----------
     attitude, rates : str
         Numbers of the tables; without one for the rates there are no rows of them.
-    test : Test
+    test : Trial
         Which.
     printed : 3 rows of 3
         RMS of quaternion, angles, rates.
@@ -194,7 +194,7 @@ def error_rows(
     return rows + (_rate_rows(rates, test, printed[2], ran) if rates else [])
 
 
-def _rate_rows(table: str, test: Test, printed: tuple[float, float, float], ran: Ran) -> list[Row]:
+def _rate_rows(table: str, test: Trial, printed: tuple[float, float, float], ran: Ran) -> list[Row]:
     rows = []
     for k, axis in enumerate("xyz"):
         item = f"table {table}, {test.name}, RMS of w{axis}"
@@ -217,7 +217,7 @@ def _bounded(item: str, printed: float, ran: Ran, part: str, k: int, unit: str) 
 def ground_rows(
     attitude: str,
     rates: str,
-    test: Test,
+    test: Trial,
     printed: tuple[tuple[float, float, float], ...],
     ran: Ran,
     clean: Ran,

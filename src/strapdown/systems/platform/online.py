@@ -14,7 +14,7 @@ from strapdown.systems.platform.offline import Ran, error_rows, ground_rows, mot
 from strapdown.systems.platform.replay import (
     CONVERGED_S,
     Replay,
-    Test,
+    Trial,
     errors,
     replay,
     space,
@@ -22,16 +22,16 @@ from strapdown.systems.platform.replay import (
 )
 
 SPACE_TESTS: Final = (
-    Test("TEST 1 on-line", 180.0, (5.475, 6.904, 6.969), (18.061, 16.786, 19.443), 170.0),
-    Test("TEST 2 on-line", 180.0, (5.141, 7.073, 6.040), (22.008, 18.893, 20.137), 170.0),
-    Test("TEST 3 on-line", 180.0, (5.827, 7.294, 6.359), (17.366, 21.748, 17.519), 170.0),
-    Test("TEST 4 on-line", 180.0, (6.807, 7.922, 8.070), (22.328, 22.504, 26.128), 170.0),
+    Trial("TEST 1 on-line", 180.0, (5.475, 6.904, 6.969), (18.061, 16.786, 19.443), 170.0),
+    Trial("TEST 2 on-line", 180.0, (5.141, 7.073, 6.040), (22.008, 18.893, 20.137), 170.0),
+    Trial("TEST 3 on-line", 180.0, (5.827, 7.294, 6.359), (17.366, 21.748, 17.519), 170.0),
+    Trial("TEST 4 on-line", 180.0, (6.807, 7.922, 8.070), (22.328, 22.504, 26.128), 170.0),
 )
 TERRESTRIAL_TESTS: Final = (
-    Test("TEST 1 on-line", 180.0, (6.136, 7.709, 6.392), (18.130, 21.435, 18.252), 170.0),
-    Test("TEST 2 on-line", 180.0, (5.550, 7.816, 6.761), (18.130, 19.313, 19.183), 170.0),
-    Test("TEST 3 on-line", 180.0, (4.398, 7.342, 7.503), (17.435, 20.802, 18.092), 170.0),
-    Test("TEST 4 on-line", 180.0, (3.901, 6.00, 7.662), (13.183, 17.908, 21.137), 170.0),
+    Trial("TEST 1 on-line", 180.0, (6.136, 7.709, 6.392), (18.130, 21.435, 18.252), 170.0),
+    Trial("TEST 2 on-line", 180.0, (5.550, 7.816, 6.761), (18.130, 19.313, 19.183), 170.0),
+    Trial("TEST 3 on-line", 180.0, (4.398, 7.342, 7.503), (17.435, 20.802, 18.092), 170.0),
+    Trial("TEST 4 on-line", 180.0, (3.901, 6.00, 7.662), (13.183, 17.908, 21.137), 170.0),
 )
 # RMS of q1 q2 q3 and of phi theta psi [deg]: tables 9.7 and 9.9.
 SPACE: Final = (

@@ -28,7 +28,7 @@ MAG_FACTOR: Final = 20.0
 RESIDUAL_G: Final = (2.189e-2, 1.303e-2, 0.927e-2)
 
 
-class Test(NamedTuple):
+class Trial(NamedTuple):
     """A printed test.
 
     Attributes
@@ -103,12 +103,12 @@ class Errors(NamedTuple):
         return Errors(*(np.sqrt(np.mean(part[rows] ** 2, axis=0)) for part in self))
 
 
-def replay(test: Test, seed: int, number: int = 0) -> Replay:
+def replay(test: Trial, seed: int, number: int = 0) -> Replay:
     """Return the log of a test: moved by hand at random with its printed RMS rates.
 
     Parameters
     ----------
-    test : Test
+    test : Trial
         Which.
     seed : int
         Of motion and noise.

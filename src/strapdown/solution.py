@@ -32,6 +32,7 @@ class Status(IntFlag):
     MAG_DISTURBED = _s.MAG_DISTURBED  # the field is not as usual: disturbed
     OUTAGE = _s.OUTAGE  # aiding that bounds the position is missing
     MAG_MISSING = _s.MAG_MISSING  # no valid field for seconds, though there was one
+    GYR_STUCK = _s.GYR_STUCK  # rates of exactly zero where the box was just turning: used
 
 
 @unique

@@ -137,5 +137,41 @@ def test_a_rate_is_not_held_for_longer_than_a_gap():
     invalid = np.flatnonzero(np.array(words) & s.GYR_INVALID)
     assert invalid[0] == pytest.approx(50, abs=1)
     assert len(invalid) == len(words) - invalid[0]
-    feed(flt, x, P, 2.0, np.zeros(3), ACC)
+    feed(flt, x, P, 2.0, [0.1, 0.2, 0.3], ACC)
     assert int(x[m.STATUS]) == s.GAP
+
+
+# --- a gyroscope that sticks at zero ---------------------------------------------------------
+
+
+def test_zero_rates_right_after_turning_are_doubted_for_five_seconds_and_used():
+    flt = GyroIntegration()
+    x, P = start(flt, scalar_first(R_NB))
+    rates = [[0.0, 0.0, 0.0]] * 3 + [[0.3, 0.0, 0.0]] * 5 + [[0.0, 0.0, 0.0]] * 70
+    words = []
+    for k, rate in enumerate(rates):
+        feed(flt, x, P, (k + 1) * DT, rate, np.full(3, np.inf))
+        words.append(int(x[m.STATUS]))
+    flagged = np.flatnonzero(np.array(words) & s.GYR_STUCK)
+    assert flagged[0] == 8
+    assert len(flagged) == flagged[-1] - 7 == pytest.approx(50, abs=1)  # sum of fifty 0.1 s
+    want = R_NB * Rotation.from_rotvec([5 * DT * 0.3, 0.0, 0.0])
+    assert (rotation(quat(x)) * want.inv()).magnitude() < 1e-13
+
+
+@pytest.mark.parametrize("rate", [[0.0, 0.0, 1e-9], [0.009, 0.0, 0.0]])
+def test_slow_rates_are_not_doubted(rate):
+    flt = GyroIntegration()
+    x, P = start(flt, scalar_first(R_NB))
+    for k in range(20):
+        feed(flt, x, P, (k + 1) * DT, rate if k < 10 else np.zeros(3), np.full(3, np.inf))
+        assert int(x[m.STATUS]) == 0
+
+
+def test_deviations_of_a_kalman_filter_grow_while_the_gyroscope_sticks():
+    flt = Mekf()
+    x, P = start(flt, scalar_first(R_NB))
+    feed(flt, x, P, DT, [0.3, 0.0, 0.0], np.full(3, np.inf))
+    before = x[m.STD_ATT + 2]
+    feed(flt, x, P, 2 * DT, np.zeros(3), np.full(3, np.inf))
+    assert x[m.STD_ATT + 2] ** 2 - before**2 > 0.9 * (flt.gap_rate * DT) ** 2

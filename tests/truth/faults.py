@@ -7,7 +7,7 @@ both: `astray`.
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
+from functools import cache, lru_cache
 from typing import Any
 
 import numpy as np
@@ -126,6 +126,20 @@ def _spoiled(rec: Recording, sensor: str, start: float, count: int, value: float
 
 INVALID = {"gyr": Status.GYR_INVALID, "acc": Status.ACC_INVALID, "mag": Status.MAG_INVALID}
 TITLES = {"gyr": "gyroscope", "acc": "accelerometer", "mag": "magnetometer"}
+LOST = "10 % of the samples lost in 20 s"
+NAMES = (
+    *(f"{what} of the {sensor}" for what in ("one NaN", "100 NaN", "100 zero vectors")
+      for sensor in TITLES.values()),
+    LOST,
+    "sampling times off by up to 4 ms, and known",
+    "gyroscope clipped at 15 deg/s, its range declared",
+    "gap of 5 s",
+    "magnetometer unplugged at half time",
+    "magnet near for 15 s",
+    "pulling out of rest at 0.3 m/s² for 10 s",
+    "turning out of rest at 1 deg/s for 10 s",
+    *(f"start {how}" for how in ("upside down", "nose up", "nose down")),
+)  # fmt: skip
 STARTS = {
     "upside down": (np.pi, 0.0, 0.7),
     "nose up": (0.3, np.pi / 2, 0.7),
@@ -134,23 +148,28 @@ STARTS = {
 RANGE = 15.0 * DPS  # the scenario turns by up to 40 deg/s
 
 
-def cases() -> Iterator[Case]:
-    """Yield all faults."""
+@cache
+def cases() -> Mapping[str, Case]:
+    """Return all faults by name."""
+    return {case.name: case for case in _cases()}
+
+
+def _cases() -> Iterator[Case]:
     rec, r_nb = log()
     known = (r_nb, r_nb)
     rates = {"gyr": RATE, "acc": RATE, "mag": (len(rec.mag) - 1) / np.ptp(rec.mag.t)}
     for words, value, count in (("one NaN", np.nan, 1), ("100 NaN", np.nan, 100),
                                 ("100 zero vectors", 0.0, 100)):  # fmt: skip
         for sensor, rate in rates.items():
-            may_be = sensor == "gyr" and value == 0.0  # a rate may be zero
+            stuck = sensor == "gyr" and value == 0.0  # a rate may be zero
             yield Case(
                 f"{words} of the {TITLES[sensor]}",
                 _spoiled(rec, sensor, 60.0, count, value),
                 rec, 60.0, 60.0 + count / rate,
-                Status(0) if may_be else INVALID[sensor], truths=known,
+                Status.GYR_STUCK if stuck else INVALID[sensor], truths=known,
             )  # fmt: skip
     rng = np.random.default_rng(11)
-    yield _cut("10 % of the samples lost in 20 s", 40.0, 60.0, lambda n: rng.random(n) < 0.1)
+    yield _cut(LOST, 40.0, 60.0, lambda n: rng.random(n) < 0.1)
     jittered, r_jittered = log(jitter=0.004)
     yield Case(
         "sampling times off by up to 4 ms, and known",
@@ -233,6 +252,8 @@ class Outcome:
         How long after the end of the fault it came back for good [s]; infinite if never.
     at_end : float
         How far off at the end of the log [deg].
+    extra : float
+        Largest error in the fault less the largest error there on the untouched log [deg].
     """
 
     finite: bool
@@ -240,24 +261,30 @@ class Outcome:
     largest: float
     recovery: float
     at_end: float
+    extra: float
 
 
 def judge(flt: Any, case: Case) -> Outcome:
     """Run an estimator on both logs and compare."""
-    flt = replace(flt, **case.parameters)
-    sol, clean = flt.run(case.rec), flt.run(case.clean)
+    sol, clean = replace(flt, **case.parameters).run(case.rec), flt.run(case.clean)
     parts = (sol.q_nb, sol.gyr_bias, sol.std_attitude_n, sol.std_gyr_bias)
-    finite = all(part is None or np.isfinite(part).all() for part in parts)
     off = astray(sol, clean, case)
-    after = sol.t >= case.start
-    bad = np.flatnonzero((off > RECOVERED) & after)
-    recovery = 0.0
-    if len(bad):
-        recovery = max(0.0, float(sol.t[bad[-1]]) - case.end)
-        if bad[-1] == len(off) - 1:
-            recovery = np.inf
-    return Outcome(finite, _new_flags(sol, clean, case), float(off[after].max()), recovery,
-                   float(off[-1]))  # fmt: skip
+    bad = np.flatnonzero((off > RECOVERED) & (sol.t >= case.start))
+    recovery = max(0.0, float(sol.t[bad[-1]]) - case.end) if len(bad) else 0.0
+    if len(bad) and bad[-1] == len(off) - 1:
+        recovery = np.inf
+    worst = [
+        np.degrees(errors(s, r_nb).magnitude()[(s.t >= case.start) & (s.t <= case.end)]).max()
+        for s, r_nb in zip((sol, clean), case.truths, strict=True)
+    ]
+    return Outcome(
+        finite=all(part is None or bool(np.isfinite(part).all()) for part in parts),
+        flags=_new_flags(sol, clean, case),
+        largest=float(off[sol.t >= case.start].max()),
+        recovery=recovery,
+        at_end=float(off[-1]),
+        extra=float(worst[0] - worst[1]),
+    )
 
 
 def errors(sol: Any, r_nb: Rotation) -> Rotation:

@@ -321,7 +321,7 @@ def step(
         x[T_ACC] = x[T]
         x[T_MAG] = x[T]
     propagate(P, w, p, rx, ry, rz, dt)
-    if (int(x[STATUS]) & s.SATURATED) != 0:
+    if (int(x[STATUS]) & (s.SATURATED | s.GYR_STUCK)) != 0:
         unknown = p[P_GAP_RATE] * dt
         for i in range(3):
             P[i, i] += min(unknown * unknown, pi * pi)

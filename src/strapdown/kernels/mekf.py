@@ -342,7 +342,7 @@ def step(
             write_std(x, P)
             return
     q_theta = p[P_GYR_NOISE] * p[P_GYR_NOISE] * dt
-    if (int(x[STATUS]) & s.SATURATED) != 0:
+    if (int(x[STATUS]) & (s.SATURATED | s.GYR_STUCK)) != 0:
         unknown = p[P_GAP_RATE] * dt
         q_theta += min(unknown * unknown, pi * pi)
     transition(w, rx, ry, rz, dt)

@@ -41,7 +41,8 @@ FIELD_NEW = 75  # the same of a disturbed field that may become usual: 2
 FIELD_HELD = 77  # how long it has stayed the same [s]
 FIELD_WAIT = 78  # how long the field must still be as usual to be trusted [s]
 AHEAD = 79  # how far the attitude is carried on by a held rate [s]
-HEAD = 80
+STUCK = 80  # how long a rate of zero is still doubted [s]
+HEAD = 81
 
 # --- how far alignment is -----------------------------------------------------------------
 NO = 0.0
@@ -77,6 +78,10 @@ MIN_ACC2 = 1e-12  # (10^-6 m/s^2)^2
 MAX_ACC2 = 1e10  # (10^5 m/s^2)^2
 MIN_MAG2 = 1e-24  # (10^-12 T)^2
 MAX_MAG2 = 1e4  # (100 T)^2
+
+# Three rates of exactly zero are no motion that stops: a gyroscope has noise and a bias.
+TURNING2 = 1e-4  # (0.01 rad/s)^2, the box was turning
+STUCK_TIME = 5.0  # then it may be an ideal sensor at rest [s]
 
 # The usual field; `P_REJECT` says whether more than a flag comes of it.
 FIELD_OFF = 0.2  # so far off, relative, it is disturbed: a fifth of its strength, or 11 deg of dip
@@ -356,6 +361,15 @@ def begin(
             wx += missed * (x[OMEGA] - gx)
             wy += missed * (x[OMEGA + 1] - gy)
             wz += missed * (x[OMEGA + 2] - gz)
+    if gx == 0.0 and gy == 0.0 and gz == 0.0:
+        turned2 = x[OMEGA] * x[OMEGA] + x[OMEGA + 1] * x[OMEGA + 1] + x[OMEGA + 2] * x[OMEGA + 2]
+        if turned2 > TURNING2:
+            x[STUCK] = STUCK_TIME
+        if x[STUCK] > 0.0:
+            x[STUCK] -= dt
+            bits |= s.GYR_STUCK
+    else:
+        x[STUCK] = 0.0
     x[AHEAD] = x[AHEAD] + dt if absent else 0.0
     x[T] = t
     x[OMEGA] = gx

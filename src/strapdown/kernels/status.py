@@ -13,6 +13,7 @@ SATURATED = 512
 MAG_DISTURBED = 1024
 OUTAGE = 2048
 MAG_MISSING = 4096
+GYR_STUCK = 8192
 
 # What became of a measurement, in the diagnostics.
 NOT_MEASURED = 0

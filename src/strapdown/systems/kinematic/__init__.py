@@ -1,7 +1,15 @@
 """Thesis B, a sensor for human motion: its experiments."""
 
 from strapdown.systems._parts import Part
-from strapdown.systems.kinematic import growth, moving, relations, static, still, vectors
+from strapdown.systems.kinematic import (
+    filters,
+    growth,
+    moving,
+    relations,
+    static,
+    still,
+    vectors,
+)
 
 PARTS: tuple[Part, ...] = (
     static.PART,
@@ -10,4 +18,5 @@ PARTS: tuple[Part, ...] = (
     still.PART,
     moving.PART,
     vectors.PART,
+    filters.PART,
 )

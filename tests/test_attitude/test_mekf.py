@@ -1,5 +1,7 @@
 """The MEKF as a whole: consistent where its model holds, by Monte Carlo."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -7,6 +9,8 @@ from scipy.stats import chi2
 
 from strapdown.attitude import Mekf
 from strapdown.recording import Imu, Mag, Recording
+from strapdown.simulation import demo
+from strapdown.solution import Outcome
 
 G = 9.80665
 RATE = 100.0
@@ -80,3 +84,24 @@ def test_one_run_is_no_surprise():
     mean = np.mean([model_run(flt, seed) for seed in range(4)])
     low, high = chi2.ppf([1e-6, 1.0 - 1e-6], 6 * 4 * len(CHECKS)) / (4 * len(CHECKS))
     assert low < mean < high
+
+
+def test_diagnostics_of_the_field_are_its_heading_and_nothing_empty():
+    rec = demo.recording(duration=14.0)
+    found = Mekf().run(rec).diagnostics
+    assert found["mag"].labels == ("heading",)
+    used = found["mag"].outcome == Outcome.ACCEPTED
+    assert used.sum() > 100
+    assert np.isfinite(found["mag"].innovation[used]).all()
+    assert np.isfinite(found["mag"].sigma[used]).all()
+    assert found["acc"].labels == ("x", "y", "z")
+
+
+def test_first_field_after_a_long_wait_leaves_the_deviation_of_the_tilt():
+    rec = demo.recording(duration=40.0)
+    late = replace(rec, mag=rec.mag.between(30.0, 40.0))
+    sol = Mekf().run(late)
+    k = int(np.searchsorted(sol.t, late.mag.t[0]))
+    before, after = sol.std_attitude_n[k - 1], sol.std_attitude_n[k]
+    assert (after[:2] < 1.05 * before[:2]).all()
+    assert after[2] == pytest.approx(Mekf().std_heading, rel=0.02)

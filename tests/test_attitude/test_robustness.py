@@ -233,6 +233,8 @@ def test_heading_reference_is_said_and_declination_turns_the_heading_by_itself(f
     assert true.heading_reference == "true"
     assert flt.run(replace(rec, mag=None)).heading_reference == "arbitrary"
     assert replace(flt, use_mag=False).run(rec).heading_reference == "arbitrary"
+    silent = flt.run(spoiled(rec, "mag", slice(None), np.nan))
+    assert silent.heading_reference == "arbitrary"
     turned = Rotation.from_euler("Z", d) * Rotation.from_quat(magnetic.q_nb[:, [1, 2, 3, 0]])
     # the same filter seen from a frame turned about down
     assert hand.degrees_off(true.q_nb, turned).max() < 1e-9

@@ -227,3 +227,23 @@ def test_held_accelerometer_samples_are_no_measurements(flt):
     for (t, gyr, acc, field), is_real in zip(streams.samples(one), real, strict=True):
         trk.update(t, gyr, acc if is_real else None, field)
     assert np.array_equal(trk.state.x, state.x, equal_nan=True)
+
+
+def test_held_rates_are_no_measurements(flt):
+    """The same for a gyroscope slower than the accelerometer."""
+    rng = np.random.default_rng(5)
+    real = np.arange(len(LOG.imu)) % 3 == 1
+    other = np.where(real[:, None], LOG.imu.gyr, rng.standard_normal(LOG.imu.gyr.shape))
+    one = replace(LOG, imu=replace(LOG.imu, gyr_real=real))
+    two = replace(LOG, imu=replace(LOG.imu, gyr=other, gyr_real=real))
+    streams.assert_same_bits(flt.run(one), joined([flt.run(two)]))
+    parts, _ = in_pieces(flt, one, [0.5, 4.0, 9.0])
+    streams.assert_same_bits(flt.run(one), joined(parts))
+    state, states = flt.init(), []
+    trk = flt.tracker()
+    for (t, gyr, acc, field), is_real in zip(streams.samples(one), real, strict=True):
+        state = flt.step(state, t, gyr if is_real else None, acc, field)
+        states.append(state)
+        trk.update(t, gyr if is_real else None, acc, field)
+    streams.assert_same_bits(flt.run(one), streams.collect(states))
+    assert np.array_equal(trk.state.x, state.x, equal_nan=True)

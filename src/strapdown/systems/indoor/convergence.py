@@ -230,7 +230,7 @@ def _figure() -> page.Block:
             (TwoStage.as_printed(), "as printed", "#d55e00"),
         )
     ]
-    panel = Panel(y_label="yaw [deg]", items=items, height=220)
+    panel = Panel(y_label="yaw [deg]", items=items, height=220, y_range=(-102.0, -92.0))
     return page.plot(time_figure([panel]), "Box at -100/10/-20 deg, start level.")
 
 

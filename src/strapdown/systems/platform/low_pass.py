@@ -161,9 +161,9 @@ def _folded(k: int) -> Row:
 def _noise_panel(study: LowPassStudy) -> Panel:
     return Panel(
         x_label="cut-off [Hz]",
-        y_label="noise error [deg]",
+        y_label="noise error [mdeg]",
         items=[
-            Series(x=study.cutoff_hz[::-1], y=row[::-1] / DEG, name=f"{multiple:g} sigma",
+            Series(x=study.cutoff_hz[::-1], y=row[::-1] / DEG * 1e3, name=f"{multiple:g} sigma",
                    color=_COLORS[k], kind="path")
             for k, (multiple, row) in enumerate(
                 zip(study.multiples, study.noise_error, strict=True)
@@ -181,7 +181,7 @@ def _delay_panel(study: LowPassStudy) -> Panel:
         y_label="delay error [deg]",
         items=[
             Series(x=study.cutoff_hz[::-1], y=study.delay_error[row, ::-1] / DEG,
-                   name=f"{study.rates[row] / DPS:.2g} deg/s", color=_COLORS[3 + k], kind="path")
+                   name=f"{study.rates[row] / DPS:.1g} deg/s", color=_COLORS[3 + k], kind="path")
             for k, row in enumerate(chosen)
         ],
         height=260,

@@ -194,7 +194,9 @@ def error_rows(
     return rows + (_rate_rows(rates, test, printed[2], ran) if rates else [])
 
 
-def _rate_rows(table: str, test: Trial, printed: tuple[float, float, float], ran: Ran) -> list[Row]:
+def _rate_rows(
+    table: str, test: Trial, printed: tuple[float, float, float], ran: Ran
+) -> list[Row]:
     rows = []
     for k, axis in enumerate("xyz"):
         item = f"table {table}, {test.name}, RMS of w{axis}"

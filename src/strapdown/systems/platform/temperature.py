@@ -77,7 +77,8 @@ def run(seed: int) -> Shown:
         )
     )  # fmt: skip
     block = page.plot(
-        grid_figure(panels, columns=2), "Figures 6.12 and 6.13: output over temperature, at rest."
+        grid_figure(panels, columns=2),
+        "Figures 6.12 and 6.13: output over temperature, at rest, less its mean.",
     )
     return Shown(rows=rows, blocks=(block,))
 
@@ -196,7 +197,6 @@ def _panel(sensor: str, test: int, temp: FloatArray, y: FloatArray) -> Panel:
             )
             for k, axis in enumerate("xyz")
         ],
-        title="less the mean",
         height=220,
     )
 

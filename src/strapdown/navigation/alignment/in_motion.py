@@ -213,7 +213,7 @@ def velocity_matching(
         raise InputError(
             "the accelerations of the box must fit those of the fixes, they are "
             f"{math.sqrt(fit):.1f} times as far off as their sigmas say; check axes (swapped, "
-            "mirrored), units, and the time stamps of `imu` against `gnss`; take the gyro bias out."
+            "mirrored), units, and the time stamps of `imu` against `gnss`; take the bias out."
         )
     # from the axes at the start, which keep still in space, to those of the end
     elapsed = float(samples.t[-1] - fixes.t[0])

@@ -151,9 +151,8 @@ def _panels(rms: FloatArray, systematic: bool) -> list[Panel]:
     return [
         Panel(
             x_label="k",
-            y_label="RMS",
+            y_label=f"RMS, {kind}",
             items=items,
-            title=kind,
             height=220,
             log_x=True,
             log_y=log,

@@ -7,6 +7,8 @@ import numpy as np
 
 from strapdown.attitude import IndirectEkf
 from strapdown.recording import Recording
+from strapdown.report import page
+from strapdown.report.figures import AXIS_COLORS, Panel, Series, time_figure
 from strapdown.solution import Solution
 from strapdown.systems._parts import Part
 from strapdown.systems._rows import Row, Shown, info, worded
@@ -61,6 +63,7 @@ def run(seed: int) -> Shown:
     Shown
     """
     rows: list[Row] = []
+    panels: dict[str, list[Panel]] = {"9.18, space": [], "9.19, terrestrial": []}
     same = True
     for test, printed in zip(SPACE_TESTS, SPACE, strict=True):
         log = replay(test, seed)
@@ -68,6 +71,7 @@ def run(seed: int) -> Shown:
         ran, equal = streamed(log, *space(log))
         same = same and equal
         rows += error_rows("9.7", "", test, printed, ran)
+        panels["9.18, space"].append(_panel(test, log, ran))
     for test, printed in zip(TERRESTRIAL_TESTS, TERRESTRIAL, strict=True):
         log = replay(test, seed, number=1)  # another motion than the space tests of that name
         rows += motion_rows("9.8", test, log)
@@ -75,6 +79,7 @@ def run(seed: int) -> Shown:
         same = same and equal
         clean, _ = streamed(log, *terrestrial(log, systematic=False))
         rows += ground_rows("9.9", "", test, printed, ran, clean)
+        panels["9.19, terrestrial"].append(_panel(test, log, ran))
     rows += [
         worded(
             "9.3, the filter runs sample by sample", "in real time",
@@ -84,7 +89,22 @@ def run(seed: int) -> Shown:
         info("tables 9.6, 9.8, unit of the RMS", "deg", "deg/s", "", "misprint"),
         info("9.3, rates on line", None, None, "", "the thesis has no table of their errors"),
     ]  # fmt: skip
-    return Shown(rows=rows)
+    blocks = [
+        page.plot(time_figure(four), f"Figure {name} scenario: errors of the angles.")
+        for name, four in panels.items()
+    ]
+    return Shown(rows=rows, blocks=blocks)
+
+
+def _panel(test: Trial, log: Replay, ran: Ran) -> Panel:
+    counted = log.t >= CONVERGED_S
+    return Panel(
+        y_label=f"{test.name.split(' on')[0]} [deg]",
+        items=[
+            Series(x=log.t[counted], y=ran.found.rpy[counted, k], name=name, color=AXIS_COLORS[k])
+            for k, name in enumerate(("phi", "theta", "psi"))
+        ],
+    )
 
 
 def streamed(log: Replay, flt: IndirectEkf, rec: Recording) -> tuple[Ran, bool]:

@@ -78,7 +78,7 @@ def run(seed: int) -> Shown:
     )  # fmt: skip
     block = page.plot(
         grid_figure(panels, columns=2),
-        "Figures 6.12 and 6.13: output over temperature, at rest, less its mean.",
+        "Figures 6.12 and 6.13: output over temperature at rest, less its mean.",
     )
     return Shown(rows=rows, blocks=(block,))
 

@@ -127,7 +127,7 @@ def run(seed: int) -> Shown:
 
 
 def _sums(rec: Recording) -> FloatArray:
-    """Return the sums of the rates on each axis, (2.8) of the extraction [rad]."""
+    """Return the sums of the rates on each axis [rad]."""
     imu, _ = device.streams(rec)
     return np.asarray(np.cumsum(imu.gyr, axis=0) / device.RATE)
 

@@ -43,6 +43,8 @@ FLAGS: dict[Status, Flag] = {
     Status.REST: Flag("#3b9b6d", "found to be at rest"),
     Status.SATURATED: Flag(ALARM, "a sensor is at the end of its range"),
     Status.MAG_DISTURBED: Flag("#b4549c", "magnetic field found to be disturbed"),
+    Status.MAG_MISSING: Flag("#7a3b6a", "no valid field for 5 s: heading drifts"),
+    Status.GYR_STUCK: Flag("#8c2f39", "rates of exactly zero while the box was turning"),
     Status.OUTAGE: Flag("#b4549c", "aiding that bounds the position is missing"),
 }
 

@@ -15,6 +15,7 @@ from strapdown.systems.platform import (
     bench,
     calibrations,
     encoders,
+    equations,
     low_pass,
     multiplier,
     offline,
@@ -103,6 +104,20 @@ def test_a_table_that_counts_the_other_way_is_missed():
     row = encoders.counting(turned)
     assert row.verdict is Verdict.MISSED
     assert row.here == 8.0  # those that count nothing
+
+
+def test_process_noise_with_half_its_cross_term_is_missed(monkeypatch):
+    assert {row.verdict for row in equations._noise()[:2]} == {Verdict.MET}
+
+    def halved(*arguments, **keywords):
+        Q = whole(*arguments, **keywords)
+        Q[:3, 3:] *= 0.5
+        Q[3:, :3] *= 0.5
+        return Q
+
+    whole = equations.noise
+    monkeypatch.setattr(equations, "noise", halved)
+    assert {row.verdict for row in equations._noise()[:2]} == {Verdict.MISSED}
 
 
 def test_an_error_beyond_three_sigma_at_100_hz_is_missed():

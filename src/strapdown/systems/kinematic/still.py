@@ -285,7 +285,7 @@ def _limits(rec: Recording, high: Response) -> list[Row]:
                   2.0 * beta / device.RATE / DEG, "deg"),
         *(
             not_given(f"item 48, largest rate of correction, beta {name}", slew, "deg/s",
-                      "over 1 s of the transient; 2 beta is its limit")
+                      "over 1 s of the transient; at most 2 beta and the bias")
             for name, slew in slews.items()
         ),
         info("item 48, attitude that changes too abruptly", "reliability not guaranteed", None, "",

@@ -155,8 +155,8 @@ def test_settling_time_is_the_last_peak_that_is_off():
 
 def test_a_k_that_is_not_the_best_is_missed():
     k = np.array(multiplier.FACTORS)
-    falling = np.tile((0.02 + 0.1 / k**2)[:, np.newaxis], (1, 3))
-    rising = np.tile((0.001 * k)[:, np.newaxis], (1, 3))
+    falling = np.tile((0.02 + 0.1 / k**2)[:, np.newaxis], (1, 5))
+    rising = np.tile((0.001 * k)[:, np.newaxis], (1, 5))
     good, bad = (
         verdicts(multiplier.curve_rows(np.stack([curve] * 3), True)[-2:])
         for curve in (falling, rising)

@@ -10,7 +10,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from strapdown._types import FloatArray
+from strapdown._types import BoolArray, FloatArray
 from strapdown.attitude import IndirectEkf
 from strapdown.calibration import CalibrationRecord
 from strapdown.calibration.encoder import HEDM5500_RESOLUTION, smooth_angles
@@ -98,7 +98,7 @@ class Errors(NamedTuple):
     rpy: FloatArray
     rates: FloatArray
 
-    def rms(self, rows: slice | FloatArray) -> "Errors":
+    def rms(self, rows: slice | BoolArray) -> "Errors":
         """Return the RMS of each column over some rows."""
         return Errors(*(np.sqrt(np.mean(part[rows] ** 2, axis=0)) for part in self))
 

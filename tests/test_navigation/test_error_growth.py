@@ -144,6 +144,16 @@ def test_perfect_sensors_at_rest_stay_where_they_are(lat):
     assert np.abs(phi).max() < 1e-12
 
 
+@pytest.mark.parametrize("frame", ["ned", "wander", "ecef"])
+def test_rest_is_rest_at_two_samples_per_second_too(frame):
+    """Body and frame turn as one, within a step as well: nothing is left but rounding."""
+    samples = at_rest(0.6, 600.0, 0.5)
+    start = Start(lla=(0.6, 0.3, 0.0), q_nb=(1, 0, 0, 0))
+    sol = mechanise(samples, start, frame=frame)
+    assert np.abs(sol.v_n).max() < 1e-9
+    assert np.abs(sol.lla - sol.lla[0]).max() < 1e-9
+
+
 @pytest.mark.parametrize("frame", ["ned", "wander", "ecef", "inertial"])
 def test_velocity_error_oscillates_with_84_4_minutes(frame):
     t, p, _, _ = run_with(0.0, 2 * HOURS, frame, velocity_n=(0.05, 0, 0))

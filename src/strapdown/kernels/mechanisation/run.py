@@ -27,6 +27,7 @@ from strapdown.kernels.mechanisation.increments import (
 from strapdown.kernels.mechanisation.layout import (
     AT_END,
     AT_START,
+    ATT,
     BEFORE,
     C0,
     C1,
@@ -34,11 +35,13 @@ from strapdown.kernels.mechanisation.layout import (
     DV,
     FIRST,
     FRAME,
+    HEIGHT,
     HELD,
     INERTIAL,
     NED,
     OK,
     OMEGA,
+    OUT,
     PHI,
     POS,
     Q_EW,
@@ -78,6 +81,25 @@ def prime(x: Vec, p: Vec, w: Vec) -> None:
     x[R_N] = 1.0
     for _ in range(2):  # the radii first, then the rates that divide by them
         _middle(x, p, w, 0.0)
+
+
+# fmt: off
+@kernel
+def begin_level(
+    x: Vec, p: Vec, w: Vec, t: float,
+    lat: float, lon: float, height: float,
+    vn: float, ve: float, vd: float,
+    qw: float, qx: float, qy: float, qz: float,
+) -> None:
+    """Begin in the wander frame, its x axis to the north, with the attitude a quaternion."""
+    # fmt: on
+    x[T], x[T0] = t, t
+    x[POS + 2], x[HEIGHT] = height, height
+    x[V], x[V + 1], x[V + 2] = vn, ve, vd * (1.0 - p[HELD])
+    x[ATT], x[ATT + 1], x[ATT + 2], x[ATT + 3] = qw, qx, qy, qz
+    x[Q_EW], x[Q_EW + 1], x[Q_EW + 2], x[Q_EW + 3] = ned_axes(lat, lon)
+    x[COUNT], x[SPAN], x[BEFORE], x[STATUS] = p[FIRST], 0.0, 0.0, OK
+    prime(x, p, w)
 
 
 @kernel
@@ -178,8 +200,8 @@ def _times(w: Vec, at: int, vx: float, vy: float, vz: float) -> tuple[float, flo
 
 
 @kernel
-def store(x: Vec, p: Vec, k: int, out: Mat) -> None:
-    """Write latitude, longitude, height, ``v_n`` and ``q_nb`` into row k."""
+def tell(x: Vec, p: Vec, w: Vec) -> None:
+    """Write latitude, longitude, height, ``v_n`` and ``q_nb`` into `w`."""
     qw, qx, qy, qz = quat_of(x, p)
     vx, vy, vz = x[V], x[V + 1], x[V + 2]
     lat, lon, height = x[POS], x[POS + 1], x[POS + 2]
@@ -206,9 +228,9 @@ def store(x: Vec, p: Vec, k: int, out: Mat) -> None:
         qw, qx, qy, qz = mul(ew, -ea, -eb, -ec, qw, qx, qy, qz)
     else:
         lon -= 6.283185307179586 * _turns(lon)
-    out[k, 0], out[k, 1], out[k, 2] = lat, lon, height
-    out[k, 3], out[k, 4], out[k, 5] = vx, vy, vz
-    out[k, 6], out[k, 7], out[k, 8], out[k, 9] = qw, qx, qy, qz
+    w[OUT], w[OUT + 1], w[OUT + 2] = lat, lon, height
+    w[OUT + 3], w[OUT + 4], w[OUT + 5] = vx, vy, vz
+    w[OUT + 6], w[OUT + 7], w[OUT + 8], w[OUT + 9] = qw, qx, qy, qz
 
 
 @kernel
@@ -223,6 +245,22 @@ def _turns(lon: float) -> float:
     return float(n)
 
 
+# fmt: off
+@kernel
+def feed(
+    x: Vec, t: float, gx: float, gy: float, gz: float, fx: float, fy: float, fz: float
+) -> None:
+    """Put one sample into its slot: mean rate and specific force since the one before."""
+    # fmt: on
+    dt = t - x[T]
+    i = 3 * int(x[COUNT])
+    x[TH + i], x[TH + i + 1], x[TH + i + 2] = gx * dt, gy * dt, gz * dt
+    x[DV + i], x[DV + i + 1], x[DV + i + 2] = fx * dt, fy * dt, fz * dt
+    x[T] = t
+    x[SPAN] += dt
+    x[COUNT] += 1.0
+
+
 @kernel
 def run(x: Vec, p: Vec, w: Vec, t: Vec, gyr: Mat, acc: Mat, out: Mat) -> int:
     """Loop of `step` over mean rates and specific forces; returns the rows written.
@@ -231,17 +269,13 @@ def run(x: Vec, p: Vec, w: Vec, t: Vec, gyr: Mat, acc: Mat, out: Mat) -> int:
     """
     row = 0
     for k in range(t.shape[0]):
-        dt = t[k] - x[T]
-        i = 3 * int(x[COUNT])
-        x[TH + i], x[TH + i + 1], x[TH + i + 2] = gyr[k, 0] * dt, gyr[k, 1] * dt, gyr[k, 2] * dt
-        x[DV + i], x[DV + i + 1], x[DV + i + 2] = acc[k, 0] * dt, acc[k, 1] * dt, acc[k, 2] * dt
-        x[T] = t[k]
-        x[SPAN] += dt
-        x[COUNT] += 1.0
+        feed(x, t[k], gyr[k, 0], gyr[k, 1], gyr[k, 2], acc[k, 0], acc[k, 1], acc[k, 2])
         if x[COUNT] == p[SLOTS]:
             step(x, p, w)
             if x[STATUS] != OK:
                 return row
-            store(x, p, row, out)
+            tell(x, p, w)
+            for i in range(10):
+                out[row, i] = w[OUT + i]
             row += 1
     return row

@@ -343,8 +343,7 @@ class Mechanisation:
     def _finish(self, x: FloatArray, left: int) -> FloatArray:
         from strapdown.kernels.mechanisation.run import step
 
-        p = np.zeros(k.P_SIZE)
-        p[:] = self._p
+        p = self._p.copy()
         p[k.FIRST : k.P_SIZE] = 0.0
         increments.fill(p, left, compensate=self.compensate and left > 1)
         step(x, p, np.zeros(k.W_SIZE))
@@ -473,11 +472,11 @@ def _lock_text(frame: str) -> str:
 
 def _row(x: FloatArray, p: FloatArray) -> FloatArray:
     """Return time and the ten outputs of a state."""
-    from strapdown.kernels.mechanisation.run import store
+    from strapdown.kernels.mechanisation.run import tell
 
-    out = np.empty((1, 10))
-    store(x, p, 0, out)
-    return np.concatenate((x[k.T : k.T + 1, np.newaxis], out), axis=1)
+    w = np.zeros(k.W_SIZE)
+    tell(x, p, w)
+    return np.concatenate((x[k.T : k.T + 1], w[k.OUT : k.OUT + 10]))[np.newaxis]
 
 
 def _samples(rec: Samples) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -1,5 +1,7 @@
 """Navigation: position, velocity and attitude from an IMU and what aids it."""
 
+from strapdown.navigation import alignment, error_growth, grades
+from strapdown.navigation.dead_reckoning import DeadReckoning
 from strapdown.navigation.loosely_coupled import LooselyCoupled
 from strapdown.navigation.mechanisation import (
     Mechanisation,
@@ -11,11 +13,15 @@ from strapdown.navigation.mechanisation import (
 from strapdown.navigation.tracker import NavigationTracker
 
 __all__ = [
+    "DeadReckoning",
     "LooselyCoupled",
     "Mechanisation",
     "NavigationTracker",
     "SphericalEarth",
     "Start",
+    "alignment",
+    "error_growth",
+    "grades",
     "mechanise",
     "mechanise_plane",
 ]

@@ -11,10 +11,10 @@ from strapdown.calibration import accelerometer_from_poses
 from strapdown.constants import G0
 from strapdown.sensors import Noise, preset
 from strapdown.systems import Verdict
-from strapdown.systems.gnssins import budget, calibrations, sheets
+from strapdown.systems.gnssins import budget, calibrations, models, sheets
 from strapdown.units import DEG, DPS
 
-NAMES = ("calibration", "budget", "sheets")
+NAMES = ("calibration", "models", "budget", "sheets")
 TABLES = [
     ("table 6.1, b", "calibration", 3),
     ("table 6.1, s", "calibration", 3),
@@ -28,6 +28,17 @@ TABLES = [
     ("6.3.1,", "calibration", 6),
     ("6.3.2, 33.33 rpm", "calibration", 1),
     ("6.3.2, 45", "calibration", 1),
+    ("(1.5.2),", "models", 2),
+    ("1.5.2,", "models", 3),
+    ("1.5.6,", "models", 6),
+    ("1.3.2,", "models", 1),
+    ("(6.2.1)", "models", 3),
+    ("(6.2.2) as corrected", "models", 3),
+    ("(6.2.3)", "models", 1),
+    ("6.2.1, 18 positions", "models", 1),
+    ("(6.2.12)", "models", 2),
+    ("(6.2.17)", "models", 1),
+    ("7.3, ADIS", "models", 4),
     ("table 5.1, sigma", "budget", 1),
     ("table 5.2, sigma", "budget", 1),
     ("(6.1.3), d", "budget", 6),
@@ -41,6 +52,7 @@ TABLES = [
 # What does not come out; the remarks of the rows say why.
 MISSED = {
     "calibration": {"6.3.1, largest misalignment of table 6.1"},
+    "models": set(),
     "budget": {"table 5.2, sigma of DGPS, root of the sum of squares"},
     "sheets": set(),
 }
@@ -75,7 +87,7 @@ def test_rows_say_what_they_compare_and_why(name):
         json.dumps(row.summary(), allow_nan=False)
         claims = row.verdict in (Verdict.MET, Verdict.RECOVERED, Verdict.MISSED)
         assert not claims or row.remark
-    assert len(shown("gnssins", name).blocks) == {"sheets": 0}.get(name, 2)
+    assert len(shown("gnssins", name).blocks) == {"sheets": 0, "models": 0}.get(name, 2)
 
 
 # --- calibration ------------------------------------------------------------------------
@@ -133,6 +145,38 @@ def test_noise_behind_the_printed_variances_is_that_of_the_means():
         implied.append(sigma / np.sqrt(factor[0]))
     # 9 degrees of freedom each: 24 %, of the mean of 40 3.7 %; the root's bias is -3 %
     assert np.mean(implied) == pytest.approx(0.1, rel=0.12)
+
+
+# --- models -----------------------------------------------------------------------------
+
+
+def test_wrong_signs_in_the_printed_derivatives_are_missed(monkeypatch):
+    right = models._slopes
+
+    def printed(x, readings):
+        wrong = right(x, readings).copy()
+        wrong[:, 8] *= -1.0  # (6.2.25) as printed
+        return wrong
+
+    monkeypatch.setattr(models, "_slopes", printed)
+    found = {row.item: row for row in models._printed(np.random.default_rng(0))}
+    item = "(6.2.17) to (6.2.25) as corrected, off central differences"
+    assert found[item].verdict is Verdict.MISSED
+
+
+def test_another_accelerometer_misses_table_6_1_in_six_positions(monkeypatch):
+    monkeypatch.setattr(models, "TABLE_6_1", tuple(v + 5e-3 for v in models.TABLE_6_1))
+    found = models._positions(np.random.default_rng(0))
+    assert {r.verdict for r in found if r.item.startswith("(6.2.1)")} == {Verdict.MISSED}
+    assert {r.verdict for r in found if r.item.startswith("6.2.1, 18")} == {Verdict.MISSED}
+
+
+def test_first_order_inverse_is_missed_for_large_errors(monkeypatch):
+    large = 30.0 * models._deviations(np.random.default_rng(0))
+    monkeypatch.setattr(models, "_deviations", lambda rng: large)
+    found = {row.item: row for row in models._cluster(np.random.default_rng(1))}
+    assert found["(1.5.2), first-order inverse I - M"].verdict is Verdict.MISSED
+    assert found["(1.5.2), exact inverse of (1.5.1)"].verdict is Verdict.MET
 
 
 # --- budget and drift -------------------------------------------------------------------

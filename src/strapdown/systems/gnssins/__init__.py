@@ -1,6 +1,6 @@
 """Thesis E, a low-cost integrated GNSS/INS: its experiments."""
 
 from strapdown.systems._parts import Part
-from strapdown.systems.gnssins import budget, calibrations, sheets
+from strapdown.systems.gnssins import budget, calibrations, models, sheets
 
-PARTS: tuple[Part, ...] = (calibrations.PART, budget.PART, sheets.PART)
+PARTS: tuple[Part, ...] = (calibrations.PART, models.PART, budget.PART, sheets.PART)

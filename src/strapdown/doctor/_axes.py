@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import partial
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -21,7 +21,16 @@ _EXPLAINED: Final = 0.15
 # Asked first: the unit as stated, a half and the double of it, and degrees for radians.
 _USUAL_SCALES: Final = [1.0, 0.5, 2.0, DPS, 1.0 / DPS]
 
-_Ask = Callable[[list[float]], tuple[FloatArray, bool] | None]
+
+class _Answer(NamedTuple):
+    """How badly each hypothesis explains the turning."""
+
+    loss: FloatArray  # (blocks, scales, 48), or 96 where the course tells the field's sign
+    signed: bool
+    explained: bool  # False: not even the best does
+
+
+_Ask = Callable[[list[float]], _Answer | None]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -36,7 +45,7 @@ class Relation:
         Factor that the gyroscope's values need.
     alive : list of tuple of int
         Hypotheses that remain, best first: the number of Q, and the sign of the field where it
-        was seen, else 0.
+        was seen, else 0. Empty if none explains how the field turns.
     confidence : float
         Of the best.
     """
@@ -89,11 +98,10 @@ def relations(log: Log, grid: Grid, *, quick: bool = False) -> list[Relation]:
 
 def _losses(
     log: Log, grid: Grid, gyr: FloatArray, turning: Turning, sensor: str, scales: list[float]
-) -> tuple[FloatArray, bool] | None:
-    """Return how badly each hypothesis explains the turning, and whether its sign is among them.
+) -> _Answer | None:
+    """Return how badly each hypothesis explains the turning; None where there is none.
 
-    The array has shape (blocks, scales, 48), or 96 where the course tells the field's sign: the
-    second half is for the opposite of the field. None where nothing is explained.
+    Of 96 hypotheses the second half is for the opposite of the field.
     """
     values = grid.fields[sensor]
     evidence = turning.evidence(sensor, scales)
@@ -106,8 +114,8 @@ def _losses(
             course = course_loss(turns, scales, len(values) * grid.dt)
             mirrored = [index_of(-Q) for Q in SIGNED]
             opposite = loss + course[:, :, mirrored]
-            return np.concatenate((loss + course, opposite), axis=2), True
-    return (loss, False) if evidence.residual <= _EXPLAINED else None
+            return _Answer(np.concatenate((loss + course, opposite), axis=2), True, True)
+    return _Answer(loss, False, evidence.residual <= _EXPLAINED)
 
 
 def _relation(sensor: str, ask: _Ask, scale: float) -> Relation | None:
@@ -115,9 +123,10 @@ def _relation(sensor: str, ask: _Ask, scale: float) -> Relation | None:
     answer = ask([scale])
     if answer is None:
         return None
-    loss, signed = answer
-    alive, confidence = survivors(loss[:, 0])
-    signs = [(int(i) % 48, 0 if not signed else (1 if i < 48 else -1)) for i in alive]
+    if not answer.explained:
+        return Relation(sensor, scale, [], SURE)
+    alive, confidence = survivors(answer.loss[:, 0])
+    signs = [(int(i) % 48, 0 if not answer.signed else (1 if i < 48 else -1)) for i in alive]
     return Relation(sensor, scale, _without_sign(signs), confidence)
 
 
@@ -130,9 +139,9 @@ def _without_sign(alive: list[tuple[int, int]]) -> list[tuple[int, int]]:
 def _scale(ask: _Ask, scales: list[float]) -> float:
     """Return the scale that explains most; another than one only when it leads clearly."""
     answer = ask(scales)
-    if answer is None:
+    if answer is None or not answer.explained:
         return 1.0
-    loss, _ = answer
+    loss = answer.loss
     best = loss.sum(axis=0).min(axis=1)
     k = int(best.argmin())
     if k == 0 or best[0] - best[k] < DECIDED:
@@ -194,6 +203,17 @@ _FIELD: Final = {"acc": "gravity", "mag": "the magnetic field"}
 def _undecided(sensor: str, relation: Relation | None) -> Finding:
     """Return what is left open, or excluded without a single answer."""
     name = WORD[sensor]
+    if relation is not None and not relation.alive:
+        return Finding(
+            check="axes",
+            severity=Severity.WARNING,
+            sentence=f"The gyroscope does not explain how {_FIELD[sensor]} turns in the {name}, "
+            "whatever the axes.",
+            confidence=relation.confidence,
+            advice="Look for times of one sensor that are off by seconds, doubled or frozen "
+            "columns, a wrong unit of the gyroscope, and strong accelerations or magnets.",
+            stream=sensor,
+        )
     if relation is None or relation.agrees:
         more = ""
         if relation is not None and len(relation.alive) > 1:

@@ -29,6 +29,7 @@ def health_findings(log: Log) -> list[Finding]:
         found = [
             _missing(name, sensor),
             _stuck(name, sensor),
+            _copied(name, sensor),
             _held(name, sensor),
             _clipped(name, sensor),
             _spectrum(name, sensor),
@@ -86,6 +87,26 @@ def _stuck(name: str, sensor: Sensor) -> Finding | None:
         "--from and --to.",
         stream=name,
     )
+
+
+def _copied(name: str, sensor: Sensor) -> Finding | None:
+    """Return two axes that are one: equal, or the negative of each other, sample by sample."""
+    values = sensor.values[np.isfinite(sensor.values).all(axis=1)]
+    for i, j in ((0, 1), (0, 2), (1, 2)):
+        a, b = values[:, i], values[:, j]
+        if len(a) < 10 or np.ptp(a) == 0.0:
+            continue
+        sign = 1.0 if (a == b).all() else -1.0
+        if (a == sign * b).all():
+            return Finding(
+                check="copied",
+                severity=Severity.ERROR,
+                sentence=f"Axes {'xyz'[i]} and {'xyz'[j]} of the {WORD[name]} are "
+                f"{'the same' if sign > 0 else 'opposite'} in all samples.",
+                advice="Look at which column is read as which axis, and at --columns.",
+                stream=name,
+            )
+    return None
 
 
 def _longest_run(values: FloatArray) -> tuple[int, int]:

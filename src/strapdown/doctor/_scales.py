@@ -25,6 +25,7 @@ EARTH_FIELD_T: Final = (22.0 * UT, 67.0 * UT)
 _FIELD_TYPICAL_T: Final = 45.0 * UT
 _FIELD_POSSIBLE_T: Final = (12.0 * UT, 130.0 * UT)  # with magnets and steel nearby
 _RANGES: Final = (0.5, 2.0, 0.25, 4.0)  # of counts scaled with another range
+_SCALE_WITHIN: Final = 0.005  # of an accelerometer that tells mg from cm/s^2
 _FASTEST_GYR: Final = 36.0  # [rad/s] 2000 deg/s
 
 
@@ -106,21 +107,34 @@ def acc_units(log: Log) -> Finding | None:
     if size is None:
         return None
     ratio = size / G0
+    stated = log.sensors["acc"].unit
     if _GRAVITY_WITHIN[0] <= ratio <= _GRAVITY_WITHIN[1]:
+        text = f"The accelerometer shows {size:.2f} m/s² at its calmest, as gravity is."
+        twin = _twin(stated)
+        if stated is None or twin is None:
+            return Finding(check="units", severity=Severity.OK, sentence=text, stream="acc")
+        other = size * twin.factor / stated.factor
+        text = text[:-1] + f"; read in {twin.symbol} instead of {stated.symbol}, {other:.2f}."
+        nearer = abs(math.log(other / G0)) < abs(math.log(ratio)) - _SCALE_WITHIN
         return Finding(
             check="units",
-            severity=Severity.OK,
-            sentence=f"The accelerometer shows {size:.2f} m/s² at its calmest, as gravity is.",
+            severity=Severity.NOTE if nearer else Severity.OK,
+            sentence=text,
+            confidence=0.6,
+            advice=f"The two units differ by 2 %, as scales do: check which, or read it with "
+            f"--units acc={twin.name}."
+            if nearer
+            else "",
             stream="acc",
         )
-    stated = log.sensors["acc"].unit
     fits = [m for m in mistakes("acc", stated) if abs(math.log(ratio * m.factor)) < 0.15]
     # Without gravity the norm is what motion leaves: small, of any size and direction.
     if fits and not (ratio < 0.5 and spread > 0.5):
         why = f"at its calmest it shows {size:.4g} m/s² and gravity is 9.8"
         best = min(fits, key=lambda m: abs(math.log(ratio * m.factor)))
         return mistake_finding("acc", stated, best.factor, why, 0.99)
-    if ratio < 0.8 and mean < 0.5 * size + 0.3:
+    # Gravity of a wrong scale keeps its size while the box turns; motion does not.
+    if ratio < 0.8 and mean < 0.5 * size + 0.3 and spread > 0.2:
         return Finding(
             check="units",
             severity=Severity.ERROR,
@@ -143,6 +157,14 @@ def acc_units(log: Log) -> Finding | None:
         else "Check its scale, or calibrate it with `strapdown calibrate acc`.",
         stream="acc",
     )
+
+
+def _twin(stated: Unit | None) -> Unit | None:
+    """Return the unit that an accelerometer's scale error hides: mg and cm/s² differ by 2 %."""
+    twins = {"mg": "cm_s2", "cm_s2": "mg"}
+    if stated is None or stated.name not in twins:
+        return None
+    return next(u for u in units_of("acceleration") if u.name == twins[stated.name])
 
 
 def mag_units(log: Log) -> Finding | None:

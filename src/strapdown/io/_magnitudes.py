@@ -5,6 +5,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from strapdown._types import FloatArray
+from strapdown.constants import G0
 from strapdown.io._raw import Column, Finding, Table
 from strapdown.units import units_of
 
@@ -85,8 +86,12 @@ def check_magnitude(group: str, columns: list[Column], table: Table) -> Finding 
         hint = "specific force must contain gravity; if the log is as it should be, say "
         hint += '--units acc=m_s2 (units="acc=m_s2")'
     elif fits:
+        # mg and cm/s^2 differ by 2 %: both are said, the nearer to gravity first
+        fits.sort(key=lambda u: abs(float(u.to_si(typical)) - G0) if group == "acc" else 0.0)
         name = f"{group}={fits[0].name}"
-        hint = f'they look like {fits[0].symbol}: state it with --units {name} (units="{name}")'
+        looks = " or ".join(u.symbol for u in fits)
+        also = "".join(f", or {group}={u.name}" for u in fits[1:])
+        hint = f'they look like {looks}: state it with --units {name} (units="{name}"){also}'
     else:
         name = f"{group}={expected.units[0]}"
         looks = "they look like raw counts: scale them, or " if counts else ""

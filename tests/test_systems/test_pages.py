@@ -1,0 +1,48 @@
+"""The pages of the systems say what the command says."""
+
+from pathlib import Path
+
+import pytest
+from test_systems.shown import rows, shown
+
+from strapdown.systems import Verdict, parts
+
+DOCS = Path(__file__).resolve().parents[2] / "docs"
+
+
+@pytest.mark.parametrize("system", ["platform", "indoor"])
+def test_page_counts_the_verdicts_of_every_part(system):
+    lines = (DOCS / f"system-{system}.md").read_text("utf-8").splitlines()
+    table = [
+        [cell.strip() for cell in line.strip("|").split("|")]
+        for line in lines
+        if line.startswith("| `")
+    ]
+    assert [cells[0].strip("`") for cells in table] == [part.name for part in parts(system)]
+    for name, _, *counts in table:
+        found = [row.verdict for row in shown(system, name.strip("`")).rows]
+        assert [int(c) for c in counts] == [found.count(verdict) for verdict in Verdict]
+
+
+def test_figures_in_the_text_of_the_platform():
+    frequency, k = rows("platform", "frequency"), rows("platform", "mag-factor")
+    at = "9.1, {}, frequency at which RMS of q3 is 3 sigma"
+    assert round(frequency[at.format("space")].here) == 69
+    assert round(frequency[at.format("terrestrial")].here) == 91
+    averaged = "9.1, space, 20 Hz, gyroscope averaging over its steps, RMS of q3"
+    plain = "figures 9.3, 9.4, space, 20 Hz, RMS of q3"
+    assert frequency[averaged].here < 0.1 * frequency[plain].here
+    slow = "8.1.1, terrestrial, 5 Hz, v2 against v1, RMS of q3, relative"
+    assert f"{frequency[slow].here:.1e}" == "3.5e-04"
+    (drop,) = (row.here for item, row in k.items() if "drops drastically" in item)
+    assert float(drop.split("factor of ")[1].split()[0]) > 10.0
+
+
+def test_figures_in_the_text_of_the_indoor_unit():
+    servo = rows("indoor", "servo")
+    assert round(servo["6.3.1, swings of 0.7 s, slope of yaw"].here, 2) == 3.13
+    assert round(servo["6.3.1, swings of 0.7 s, yaw 15 s later"].here) == 157
+    left = servo["6.2.3, swings of 0.7 s, slope after compensation of the zero-rate"].here
+    assert abs(float(left.split()[0])) < 0.015
+    assert round(servo["6.3.1, swings of 0.3 s, size of the swings"].here) == 53
+    assert round(servo["6.3.1, swings of 0.3 s, slope of yaw"].here, 1) == 2.2

@@ -78,6 +78,26 @@ def test_exact_poses_give_exact_parameters():
     assert_allclose(record.correct(truth.distort(true, TABLE_6_1)), true, atol=1e-12)
 
 
+def test_errors_of_39_random_poses_are_those_of_the_cramer_rao_bound():
+    """No estimator has smaller ones: what 39 norms do not tell, no weighting brings back."""
+    limits = np.array([0.3 * MG] * 3 + [6e-4] * 6)
+    rng = np.random.default_rng(1)
+    errors, bounds, inside = [], [], []
+    for seed in range(100):
+        errors.append(values(cal.accelerometer_from_poses(acc_means(seed=seed))) - TABLE_6_1)
+        true = G * truth.directions(39, seed + 1000)
+        bounds.append(truth.bound(true, TABLE_6_1, 0.5 * MG))
+        z = rng.multivariate_normal(np.zeros(9), bounds[-1], 200)
+        inside.append((np.abs(z) < limits).all(axis=1).mean())
+    # chi-square of 100 draws, per parameter: 14 % at two sigma, and of nine of them
+    ratio = np.mean(np.square(errors), axis=0) / np.mean([np.diag(b) for b in bounds], axis=0)
+    assert (np.sqrt(ratio) < 1.25).all()
+    assert np.sqrt(ratio.mean()) == pytest.approx(1.0, abs=0.08)
+    # all nine within 0.3 mg and 6e-4: in 63 % of the draws at the bound, 4.8 % its deviation
+    share = (np.abs(errors) < limits).all(axis=1).mean()
+    assert share == pytest.approx(np.mean(inside), abs=0.145)
+
+
 def test_39_random_poses_recover_table_6_1():
     # The limits are about two standard deviations of what 39 norms can tell, so that a
     # third of all draws have one of nine parameters outside; this draw has none.

@@ -32,6 +32,25 @@ def distort(a, x):
     )
 
 
+def bound(true, x, std):
+    """Cramer-Rao bound of the nine parameters from poses whose direction nobody knows, (9, 9).
+
+    A pose tells its three readings; two of them go to its direction, so that of the readings'
+    derivatives only what no turning of the pose can make counts.
+    """
+    true, x = np.asarray(true), np.asarray(x, dtype=float)
+    step = 1e-6 * np.eye(9)
+    slopes = [(distort(true, x + d) - distort(true, x - d)) / 2e-6 for d in step]
+    matrix = distort(np.eye(3), x).T - distort(np.zeros((3, 3)), x).T
+    information = np.zeros((9, 9))
+    for k, a in enumerate(true):
+        J = np.column_stack([s[k] for s in slopes])
+        turns = matrix @ np.linalg.svd(a[np.newaxis])[2][1:].T
+        J = J - turns @ np.linalg.lstsq(turns, J, rcond=None)[0]
+        information += J.T @ J / std**2
+    return np.linalg.inv(information)
+
+
 def directions(n, seed=0):
     """Random unit vectors, uniform over the sphere."""
     v = np.random.default_rng(seed).standard_normal((n, 3))

@@ -78,10 +78,12 @@ def noise(
 
     Parameters
     ----------
-    turn, dt, truncated
+    turn, dt
         See `transition`.
     n, k : float
         Densities of rate noise and random walk.
+    truncated : bool
+        Whether v2 is asked for.
 
     Returns
     -------

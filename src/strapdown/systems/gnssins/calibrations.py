@@ -228,8 +228,6 @@ def _comments(experiment: Experiment) -> list[Row]:
              "the 35 mg rms are the output noise of the datasheet; its 0 g offset is 20 mg"),
         info("figure 6.5, temperature after switching on", "curve without numbers", None, "",
              "not readable; the preset's slopes with temperature are those of the datasheet"),
-        info("6.2.1, six-position and 18-position methods", "described", None, "",
-             "`strapdown calibrate`; no figures printed"),
     ]  # fmt: skip
 
 
@@ -247,6 +245,10 @@ def _implied_noise(experiment: Experiment) -> tuple[float, FloatArray]:
     return used * math.sqrt(factor), factor * here
 
 
+def _squared(unit: str) -> str:
+    return unit if unit == "1" else f"({unit})^2"
+
+
 def _variances(experiment: Experiment) -> list[Row]:
     """Return the rows of the table's variances, which need the noise that is not printed."""
     sigma, scaled = _implied_noise(experiment)
@@ -257,8 +259,9 @@ def _variances(experiment: Experiment) -> list[Row]:
         )
     ]  # fmt: skip
     rows += [
-        info(f"table 6.2, variance of {name}", printed, float(here), f"({unit})^2",
-             "v'v (J'J)^-1 at that noise; depends on the positions, which are not printed")
+        info(f"table 6.2, variance of {name}", printed, float(here), _squared(unit),
+             "v'v (J'J)^-1 at that noise; the larger ones in print, of s and theta, speak for "
+             "positions less spread than here")
         for name, printed, here, unit in zip(
             NAMES, VARIANCES, scaled, _units(experiment), strict=True
         )

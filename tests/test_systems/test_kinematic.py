@@ -1,6 +1,7 @@
 """Thesis B: every item of its checklist has its rows, and the verdicts are those documented."""
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -216,3 +217,16 @@ def test_without_realignment_the_turns_show_on_other_axes(monkeypatch):
     monkeypatch.setattr(device, "angles_from_rest", device.frame_angles)
     sol = still.filtered(device.record(moving.motion(), 0), device.rest_pose(), beta=0.0756)
     assert Verdict.MISSED in verdicts_of(moving._from_rest(sol), "item 47, turn")
+
+
+# --- the page ---------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_page_counts_the_verdicts_as_they_are(name):
+    text = (Path(__file__).parents[2] / "docs/system-kinematic.md").read_text("utf-8")
+    (line,) = [line for line in text.splitlines() if line.startswith(f"| `{name}` |")]
+    counts = [int(cell) for cell in line.strip("| ").split("|")[2:]]
+    order = (Verdict.MET, Verdict.MISSED, Verdict.RECOVERED, Verdict.NOT_GIVEN, Verdict.INFO)
+    found = [row.verdict for row in shown("kinematic", name).rows]
+    assert counts == [found.count(verdict) for verdict in order]

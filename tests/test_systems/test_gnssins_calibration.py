@@ -48,6 +48,8 @@ TABLES = [
     ("table 1, ADIS16405", "sheets", 61 + 3),
     ("table 1.1,", "sheets", 9),
     ("table 1.2,", "sheets", 12 + 2),
+    ("4.2, GG1178", "sheets", 11),
+    ("4.4, HG1930", "sheets", 11),
 ]
 # What does not come out; the remarks of the rows say why.
 MISSED = {
@@ -67,7 +69,8 @@ def test_every_figure_of_the_datasheets_has_a_row():
     figures = sum(len(preset(name).datasheet.figures) for name in ("adis16350", "adis16405"))
     limits = 5  # of the sensitivities, least and most in one row
     grades = 9 + 12 + 2
-    assert len(shown("gnssins", "sheets").rows) == figures + limits + grades
+    others = 2 + 11 + 2 + 11 + 1  # tables 4.1 to 4.4, ADXL-50
+    assert len(shown("gnssins", "sheets").rows) == figures + limits + grades + others
 
 
 @pytest.mark.parametrize("seed", [0, 1])

@@ -28,6 +28,7 @@ from strapdown.sensors import (
 from strapdown.sensors.presets import ALLAN_FLOOR
 from strapdown.systems._parts import Part
 from strapdown.systems._rows import Row, Shown, Tolerance, info, simulated
+from strapdown.systems.gnssins import catalogue
 from strapdown.truth import Truth
 from strapdown.units import DEG_PER_HR, DEG_PER_SQRT_HR
 
@@ -72,7 +73,7 @@ def run(seed: int) -> Shown:
     rows: list[Row] = []
     for number, (name, table) in enumerate((("adis16350", "6.3.1"), ("adis16405", "table 1"))):
         rows += _device(name, table, np.random.default_rng([seed, number]))
-    return Shown(rows=[*rows, *_grades()])
+    return Shown(rows=[*rows, *_grades(), *catalogue.rows()])
 
 
 def _device(name: str, table: str, rng: np.random.Generator) -> list[Row]:
@@ -332,7 +333,7 @@ _PRINTED: Final = {
 
 PART: Final = Part(
     name="sheets",
-    title="Datasheets of ADIS16350 and ADIS16405 on simulated sensors; grades",
-    source="1.3.3, 1.5.3, 4.5, 6.3.1; items 1, 2, F10, F42 to F44",
+    title="Datasheets of ADIS16350 and ADIS16405 on simulated sensors; grades, catalogue",
+    source="1.3.3, 1.5.3, 4.1 to 4.5, 6.3.1; items 1, 2, F10, F42 to F44",
     run=run,
 )

@@ -51,12 +51,13 @@ def test_ten_minutes_at_1_khz_agree_to_a_millimetre_with_the_truth_and_each_othe
     for frame in FRAMES:
         sol = mechanise((t, gyr, acc), start_of(flight, 0.0), frame=frame, samples=samples)
         position, velocity, attitude = errors(sol, flight)
-        assert position < 1.0 * MM
-        assert velocity < 0.01 * MM  # over 600 s, a millimetre is 0.002 mm/s
-        assert attitude < 1e-9  # 1e-9 rad of tilt make 1.8 mm in 600 s
+        # asked is a millimetre; rounding alone makes micrometres
+        assert position < 0.05 * MM
+        assert velocity < 0.001 * MM
+        assert attitude < 1e-10  # 1e-10 rad of tilt make 0.18 mm in 600 s
         ends.append(ecef(*sol.lla[-1]))
     spread = np.ptp(np.array(ends), axis=0)
-    assert np.linalg.norm(spread) < 1.0 * MM
+    assert np.linalg.norm(spread) < 0.05 * MM
 
 
 @pytest.mark.parametrize("frame", FRAMES)

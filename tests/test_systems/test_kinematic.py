@@ -10,7 +10,16 @@ from test_systems.shown import count, missed, rows, shown
 
 from strapdown.report import page
 from strapdown.systems import Verdict, parts
-from strapdown.systems.kinematic import device, growth, moving, static, still, vectors
+from strapdown.systems.kinematic import (
+    device,
+    filters,
+    growth,
+    moving,
+    relations,
+    static,
+    still,
+    vectors,
+)
 
 NAMES = [part.name for part in parts("kinematic")]
 TABLES = [
@@ -217,6 +226,34 @@ def test_without_realignment_the_turns_show_on_other_axes(monkeypatch):
     monkeypatch.setattr(device, "angles_from_rest", device.frame_angles)
     sol = still.filtered(device.record(moving.motion(), 0), device.rest_pose(), beta=0.0756)
     assert Verdict.MISSED in verdicts_of(moving._from_rest(sol), "item 47, turn")
+
+
+def test_a_wrong_formula_is_missed(monkeypatch):
+    def run():
+        found = rows_of(relations.run(0))
+        return {name for name, row in found.items() if row.verdict is Verdict.MISSED}
+
+    product, matrix, frames = (
+        relations._printed_product, relations._printed_matrix, relations._printed_frames,
+    )  # fmt: skip
+    monkeypatch.setattr(relations, "_printed_product", lambda q, p: product(p, q))
+    assert "(11), product" in run()
+    assert "(77), dq/dt = q w' / 2, w' in the sensor" in run()
+    monkeypatch.setattr(relations, "_printed_product", product)
+    monkeypatch.setattr(relations, "_printed_matrix", lambda rpy: matrix(rpy * [1, 1, -1]))
+    monkeypatch.setattr(relations, "_printed_frames", lambda q: frames(q).T)
+    assert run() == {"(6), matrix of yaw, pitch, roll", "(20), the transpose of C(q)"}
+
+
+def test_a_wrong_limb_model_is_missed(monkeypatch):
+    right = filters._limb_rate
+    monkeypatch.setattr(filters, "_limb_rate", lambda x: right(x) * [1, 1, 1, -1, 1, 1, 1])
+    found = {row.item: row.verdict for row in filters._limb(np.random.default_rng(0))}
+    assert found["(68), row 4 of Phi"] is Verdict.MISSED
+
+
+def rows_of(found):
+    return {row.item: row for row in found.rows}
 
 
 # --- the page ---------------------------------------------------------------------------

@@ -67,8 +67,14 @@ def run(seed: int) -> Shown:
 
 def _budget() -> list[Row]:
     """Return the rows of the sums."""
-    rows = []
     columns = np.array(list(BUDGET.values())).T
+    shares = 100.0 * columns**2 / np.sum(columns**2, axis=1, keepdims=True)
+    rows = [
+        info(f"table 5.{column + 1}, {name}", f"{entry[column]:g} m",
+             f"{shares[column, k]:.1f} %", "", "its share of the variance")
+        for column in range(2)
+        for k, (name, entry) in enumerate(BUDGET.items())
+    ]  # fmt: skip
     for name, total, errors, digit in zip(
         ("GPS", "DGPS"), TOTALS, columns, (0.5, 0.05), strict=True
     ):

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-from truth import hand
+from truth import faults, hand
 
 import strapdown as sd
 from strapdown.attitude import RobustEskf
@@ -491,3 +491,9 @@ def test_it_is_the_first_choice_without_gnss(scene):
 def test_an_empty_recording_gives_an_empty_solution():
     rec = log(np.empty(0), np.empty((0, 3)), np.empty((0, 3)))
     assert len(RobustEskf().smooth(rec)) == 0
+
+
+def test_a_gyroscope_stuck_at_zero_leaves_attitude_unknown_and_it_is_found_again():
+    outcome = faults.judge(RobustEskf(), faults.cases()["100 zero vectors of the gyroscope"])
+    assert outcome.largest > 5.0  # a second of turning went unseen
+    assert outcome.recovery < 15.0  # taken for a rate, it stays 7 deg off for minutes

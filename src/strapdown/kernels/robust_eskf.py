@@ -18,6 +18,7 @@ from strapdown.kernels.memory import (
     P_GYR_RANGE,
     SKIP,
     START,
+    STATUS,
     STD_ATT,
     STD_BA,
     STD_BG,
@@ -341,6 +342,9 @@ def step(
     if new_rate and _is_clipped(x, p, gx, gy, gz):  # the rate may be much higher
         x[EXTRA] += CLIPPED_TIME * dt * (gx * gx + gy * gy + gz * gz)
         set_status(x, s.SATURATED)
+    elif (int(x[STATUS]) & s.GYR_STUCK) != 0:  # it may be anything
+        k = p[P_RATE_WALK] * CLIPPED_TIME
+        x[EXTRA] += k * k * dt
 
     if has_mag:
         mx, my, mz = x[MAG + 1], x[MAG + 2], x[MAG + 3]

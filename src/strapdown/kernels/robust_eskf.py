@@ -22,6 +22,8 @@ from strapdown.kernels.memory import (
     STD_ATT,
     STD_BA,
     STD_BG,
+    STUCK,
+    STUCK_TIME,
     WIDEN,
     Q,
     T,
@@ -342,8 +344,8 @@ def step(
     if new_rate and _is_clipped(x, p, gx, gy, gz):  # the rate may be much higher
         x[EXTRA] += CLIPPED_TIME * dt * (gx * gx + gy * gy + gz * gz)
         set_status(x, s.SATURATED)
-    elif (int(x[STATUS]) & s.GYR_STUCK) != 0:  # it may be anything
-        k = p[P_RATE_WALK] * CLIPPED_TIME
+    elif (int(x[STATUS]) & s.GYR_STUCK) != 0:  # the rate has walked away unseen
+        k = p[P_RATE_WALK] * min(STUCK_TIME - x[STUCK], CLIPPED_TIME)
         x[EXTRA] += k * k * dt
 
     if has_mag:

@@ -185,7 +185,7 @@ def _parameters(experiment: Experiment) -> list[Row]:
     stds = experiment.shown(np.array([p.std for p in experiment.exact.parameters]))
     return [
         simulated(f"table {experiment.number}, {name}", printed, float(here), unit,
-                  Tolerance(absolute=SIGMAS * float(std)), "4 of its own sigmas, from noise or residuals, whichever is larger")
+                  Tolerance(absolute=SIGMAS * float(std)), "4 of its own sigmas")
         for name, printed, here, unit, std in zip(
             NAMES, experiment.printed, values, _units(experiment), stds, strict=True
         )

@@ -69,6 +69,15 @@ class AttitudeEstimator(Estimator):
 
     def _heading_reference(self, rec: Recording) -> str:
         """Return what the heading of a solution is measured from."""
-        if rec.mag is None or not self.use_mag or not np.isfinite(rec.mag.mag).all(axis=1).any():
+        if rec.mag is None or not self.use_mag or not _says_something(rec.mag.mag):
             return "arbitrary"
         return "magnetic" if self.declination is None else "true"
+
+
+def _says_something(field: FloatArray) -> bool:
+    """Whether a sample is whole; nearly always the first ones are."""
+    return any(
+        bool(np.isfinite(rows).all(axis=1).any())
+        for rows in (field[:100], field[100:])
+        if len(rows)
+    )

@@ -230,54 +230,71 @@ def note(w: Vec, cell: int, ix: float, iy: float, iz: float, outcome: int) -> No
     w[cell + 6] = outcome
 
 
+@inlined_kernel
+def _differs(h: float, d: float, usual_h: float, usual_d: float) -> bool:
+    """Whether a field is off another in strength or dip."""
+    dh, dd = h - usual_h, d - usual_d
+    usual2 = usual_h * usual_h + usual_d * usual_d
+    return dh * dh + dd * dd > FIELD_OFF * FIELD_OFF * usual2
+
+
 @kernel
-def watch_field(x: Vec, t: float, has_mag: bool) -> int:
-    """Compare strength and dip of the field in the inbox with the usual ones; returns flags."""
-    h, d = x[FIELD], x[FIELD + 1]
-    bits = 0
-    if not has_mag:
-        if h + abs(d) > 0.0 and t - x[T_FIELD] > FIELD_MISSING:
-            bits = s.MAG_MISSING
-        return bits
-    mx, my, mz = rotate(
-        x[Q], x[Q + 1], x[Q + 2], x[Q + 3], x[MAG + 1], x[MAG + 2], x[MAG + 3]
-    )
-    mh = sqrt(mx * mx + my * my)
-    dt = min(t - x[T_FIELD], 1.0)
-    x[T_FIELD] = t
-    if h + abs(d) == 0.0:
-        x[FIELD], x[FIELD + 1] = mh, mz
-        return bits
-    k = dt / (FIELD_TIME + dt)
-    if not _differs(mh, mz, h, d):
-        x[FIELD_HELD] = 0.0
-        if x[FIELD_WAIT] > 0.0:
-            x[FIELD_WAIT] -= dt
-            bits = s.MAG_DISTURBED
-        else:
-            x[FIELD] += k * (mh - h)
-            x[FIELD + 1] += k * (mz - d)
-        return bits
+def _watch_disturbed(x: Vec, h: float, d: float, dt: float) -> None:
+    """Take a field that is not as usual for the usual one once it has long stayed the same."""
     x[FIELD_WAIT] = FIELD_AGAIN
-    h, d = x[FIELD_NEW], x[FIELD_NEW + 1]
-    if x[FIELD_HELD] == 0.0 or _differs(mh, mz, h, d):
-        x[FIELD_NEW], x[FIELD_NEW + 1] = mh, mz
+    if x[FIELD_HELD] == 0.0 or _differs(h, d, x[FIELD_NEW], x[FIELD_NEW + 1]):
+        x[FIELD_NEW], x[FIELD_NEW + 1] = h, d
         x[FIELD_HELD] = 1e-9  # it has begun
     else:
-        x[FIELD_NEW] += k * (mh - h)
-        x[FIELD_NEW + 1] += k * (mz - d)
+        k = dt / (FIELD_TIME + dt)
+        x[FIELD_NEW] += k * (h - x[FIELD_NEW])
+        x[FIELD_NEW + 1] += k * (d - x[FIELD_NEW + 1])
         x[FIELD_HELD] += dt
         if x[FIELD_HELD] > FIELD_STEADY:
             x[FIELD], x[FIELD + 1] = x[FIELD_NEW], x[FIELD_NEW + 1]
             x[FIELD_HELD] = 0.0
-    return s.MAG_DISTURBED
 
 
 @inlined_kernel
-def _differs(mh: float, md: float, h: float, d: float) -> bool:
-    """Whether a field is off another in strength or dip."""
-    dh, dd = mh - h, md - d
-    return dh * dh + dd * dd > FIELD_OFF * FIELD_OFF * (h * h + d * d)
+def watch_field(x: Vec, t: float, m2: float) -> int:
+    """Compare strength and dip of the field in the inbox with the usual ones; returns flags.
+
+    `m2` is its square.
+    """
+    qw, qx, qy, qz = x[Q], x[Q + 1], x[Q + 2], x[Q + 3]
+    d = 2.0 * ((qx * qz - qw * qy) * x[MAG + 1] + (qy * qz + qw * qx) * x[MAG + 2])
+    d += (1.0 - 2.0 * (qx * qx + qy * qy)) * x[MAG + 3]
+    h = sqrt(max(m2 - d * d, 0.0))
+    dt = min(t - x[T_FIELD], 1.0)
+    x[T_FIELD] = t
+    bits = 0
+    if x[FIELD] + abs(x[FIELD + 1]) == 0.0:
+        x[FIELD], x[FIELD + 1] = h, d
+    elif _differs(h, d, x[FIELD], x[FIELD + 1]):
+        _watch_disturbed(x, h, d, dt)
+        bits = s.MAG_DISTURBED
+    elif x[FIELD_WAIT] > 0.0:
+        x[FIELD_HELD] = 0.0
+        x[FIELD_WAIT] -= dt
+        bits = s.MAG_DISTURBED
+    else:
+        k = dt / (FIELD_TIME + dt)
+        x[FIELD] += k * (h - x[FIELD])
+        x[FIELD + 1] += k * (d - x[FIELD + 1])
+    return bits
+
+
+@kernel
+def _watch_zeros(x: Vec, dt: float) -> int:
+    """Whether rates of exactly zero are to be doubted; the rate before them is still kept."""
+    last2 = x[OMEGA] * x[OMEGA] + x[OMEGA + 1] * x[OMEGA + 1] + x[OMEGA + 2] * x[OMEGA + 2]
+    if last2 > 0.0:  # the first of them
+        x[STUCK] = STUCK_TIME if last2 > TURNING2 else 0.0
+    bits = 0
+    if x[STUCK] > 0.0:
+        x[STUCK] -= dt
+        bits = s.GYR_STUCK
+    return bits
 
 
 # fmt: off
@@ -309,6 +326,7 @@ def begin(
         if not has_acc:
             note(w, D_ACC, nan, nan, nan, s.REJECTED_INVALID)
     has_mag = x[MAG] > 0.0 and p[P_USE_MAG] > 0.0
+    m2 = 0.0
     if has_mag:
         m2 = x[MAG + 1] * x[MAG + 1] + x[MAG + 2] * x[MAG + 2] + x[MAG + 3] * x[MAG + 3]
         if not (m2 > MIN_MAG2 and m2 < MAX_MAG2):
@@ -330,11 +348,14 @@ def begin(
         x[STATUS] = float(bits)
         return SKIP, 0.0, 0.0, 0.0, 0.0, False, False
     x[MAG] = 0.0
-    if x[ALIGNED] != NO:
-        bits |= watch_field(x, t, has_mag)
-    if has_mag and (bits & s.MAG_DISTURBED) != 0 and p[P_REJECT] > 0.0:
-        has_mag = False
-        note(w, D_MAG, nan, nan, nan, s.REJECTED_DISTURBED)
+    if has_mag and x[ALIGNED] != NO:
+        field_bits = watch_field(x, t, m2)
+        bits |= field_bits
+        if field_bits != 0 and p[P_REJECT] > 0.0:
+            has_mag = False
+            note(w, D_MAG, nan, nan, nan, s.REJECTED_DISTURBED)
+    elif t - x[T_FIELD] > FIELD_MISSING and x[FIELD] + abs(x[FIELD + 1]) > 0.0:
+        bits |= s.MAG_MISSING
     if abs(gx) >= p[P_GYR_RANGE] or abs(gy) >= p[P_GYR_RANGE] or abs(gz) >= p[P_GYR_RANGE]:
         bits |= s.SATURATED
 
@@ -362,15 +383,11 @@ def begin(
             wy += missed * (x[OMEGA + 1] - gy)
             wz += missed * (x[OMEGA + 2] - gz)
     if gx == 0.0 and gy == 0.0 and gz == 0.0:
-        turned2 = x[OMEGA] * x[OMEGA] + x[OMEGA + 1] * x[OMEGA + 1] + x[OMEGA + 2] * x[OMEGA + 2]
-        if turned2 > TURNING2:
-            x[STUCK] = STUCK_TIME
-        if x[STUCK] > 0.0:
-            x[STUCK] -= dt
-            bits |= s.GYR_STUCK
-    else:
-        x[STUCK] = 0.0
-    x[AHEAD] = x[AHEAD] + dt if absent else 0.0
+        bits |= _watch_zeros(x, dt)
+    if absent:
+        x[AHEAD] += dt
+    elif x[AHEAD] > 0.0:
+        x[AHEAD] = 0.0
     x[T] = t
     x[OMEGA] = gx
     x[OMEGA + 1] = gy

@@ -248,9 +248,16 @@ def _figure(runs: dict[str, Run]) -> page.Block:
     items = []
     for (name, run), color in zip(runs.items(), colors, strict=True):
         rows = np.unique(np.geomspace(100, len(run.t) - 1, 120).astype(int))
-        items.append(Series(x=run.t[rows], y=run.here[rows], name=name, color=color))
+        items.append(Series(x=run.t[rows], y=run.here[rows], name=name, color=color, kind="path"))
         items.append(
-            Series(x=run.t[rows], y=run.formula[rows], name="formula", color=color, dash="dot")
+            Series(
+                x=run.t[rows],
+                y=run.formula[rows],
+                name="formula",
+                color=color,
+                kind="path",
+                dash="dot",
+            )
         )
     panel = Panel(
         y_label="position error [m]", items=items, x_label="time [s]", height=320, log_x=True,

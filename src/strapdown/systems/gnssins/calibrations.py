@@ -363,8 +363,9 @@ def _history(experiment: Experiment, whole: str, detail: str) -> page.Block:
 
 
 def _panel(x: FloatArray, y: FloatArray, label: str) -> Panel:
+    """Return a parameter over the iterations; one name, so that no legend hides the titles."""
     items = [
-        Series(x=x[[0, -1]], y=np.full(2, y[-1]), name="end", color=MUTED, dash="dot"),
+        Series(x=x[[0, -1]], y=np.full(2, y[-1]), name="estimate", color=MUTED, dash="dot"),
         Series(x=x, y=y, name="estimate", color=ESTIMATE),
         Series(x=x, y=y, name="estimate", color=ESTIMATE, kind="points", width=5.0),
     ]

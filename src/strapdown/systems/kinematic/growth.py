@@ -183,7 +183,7 @@ def _figure(t: FloatArray, random: dict[str, FloatArray]) -> page.Block:
     colors = (*AXIS_COLORS, "#cc79a7")
     rows = np.unique(np.geomspace(10, len(t) - 1, 200).astype(int))
     items = [
-        Series(x=t[rows], y=std[rows], name=name, color=color)
+        Series(x=t[rows], y=std[rows], name=name, color=color, kind="path")
         for (name, std), color in zip(random.items(), colors, strict=True)
     ]
     panel = Panel(

@@ -88,3 +88,12 @@ def test_wheel_speed_and_pressure_enter_it_too(city):
         trk.add_pressure(city.t[k], 96500.0)
         trk.update(city.t[k], city.rec.imu.gyr[k], city.rec.imu.acc[k])
     assert np.isfinite(trk.q_nb).all()
+
+
+def test_a_slower_gyroscope_is_held(city):
+    imu, held, absent = city.rec.imu, NavigationTracker(FLT), NavigationTracker(FLT)
+    for k in range(200):
+        real = k % 3 == 0
+        held.update(imu.t[k], imu.gyr[k - k % 3], imu.acc[k])
+        absent.update(imu.t[k], imu.gyr[k] if real else None, imu.acc[k])
+    np.testing.assert_array_equal(held.state.x, absent.state.x)

@@ -99,7 +99,11 @@ class NavigationTracker(Tracker):
         self._add(_checks.finite("t", t), _m.BARO, np.array([float(pressure)]))
 
     def update(
-        self, t: float, gyr: ArrayLike, acc: ArrayLike | None, mag: ArrayLike | None = None
+        self,
+        t: float,
+        gyr: ArrayLike | None,
+        acc: ArrayLike | None,
+        mag: ArrayLike | None = None,
     ) -> None:
         """Feed one IMU sample.
 
@@ -107,8 +111,9 @@ class NavigationTracker(Tracker):
         ----------
         t : float
             Time [s], later than that of the sample before.
-        gyr : array_like, shape (3,)
-            Angular rate [rad/s].
+        gyr : array_like, shape (3,), or None
+            Angular rate [rad/s]; None where a slower gyroscope has no new sample: the last one
+            is held.
         acc : array_like, shape (3,), or None
             Specific force [m/s^2]; None where a slower accelerometer has no new sample.
         mag : array_like, shape (3,), optional
@@ -122,6 +127,8 @@ class NavigationTracker(Tracker):
         t = _checks.finite("t", t)
         if not t > self._t:
             raise ValueError(f"`t` must increase, got {t} after {self._t}.")
+        if gyr is None:
+            gyr = self._samples[-1].gyr if self._samples else np.full(3, np.nan)
         sample = _Sample(
             t,
             _checks.as_vector("gyr", gyr, allow_nan=True).copy(),

@@ -58,7 +58,8 @@ def run(seed: int) -> Shown:
     del seed
     runs = _runs()
     return Shown(
-        rows=[*_budget(), *_drift(runs), *_powers(runs)], blocks=(_entries(), _figure(runs))
+        rows=[*_budget(), *_ranges(), *_drift(runs), *_powers(runs)],
+        blocks=(_entries(), _figure(runs)),
     )
 
 
@@ -90,6 +91,37 @@ def _budget() -> list[Row]:
             rss / math.sqrt(len(errors)), "m", "the formula as printed: contradicts the tables",
         ))  # fmt: skip
     return rows
+
+
+def _ranges() -> list[Row]:
+    """Return the rows of the errors of a range, 5.8."""
+    f1, f2 = 1575.42e6, 1227.60e6
+    distance, k = 21_345_678.9, 10.0 * f1**2  # 10 m of ionosphere on L1
+    r1, r2 = distance + k / f1**2, distance + k / f2**2  # (5.8.2)
+    free = (r2 * f2**2 - r1 * f1**2) / (f2**2 - f1**2)
+    other = (r2 - r1 * f1**2 / f2**2) / (1.0 - f1**2 / f2**2)
+    pressure, temperature, vapour = 1013.25, 288.15, 11.7  # [mbar], [K], [mbar], at sea level
+    D = 0.0026 * math.cos(2.0 * PLACE[0]) + 0.00028 * PLACE[2] / 1e3  # (5.8.5)
+    zenith = 0.002277 * (1.0 + D) * (pressure + (1255.0 / temperature + 0.05) * vapour)
+    printed = 0.002277 * (1.0 + D) * pressure * (1255.0 / temperature + 0.005) * vapour
+    said = (
+        ("satellite clocks and orbit", "1 to 3 m"), ("ionosphere", "5 to 30 m"),
+        ("multipath, carrier and pseudorange", "15 cm, 15 to 30 m"),
+        ("selective availability", "200 to 300 m"), ("troposphere, left by a model", "under 1 m"),
+        ("receiver, reduced by the phase", "50 %"),
+    )  # fmt: skip
+    return [
+        compared("(5.8.3), range free of the ionosphere, first form", 0.0, free - distance, "m",
+                 Tolerance(absolute=1e-6), "less the true one, 10 m of delay on L1, (5.8.1); rounding"),
+        compared("(5.8.3), the same, second form", 0.0, other - distance, "m",
+                 Tolerance(absolute=1e-6), "less the true range; rounding at 2e7 m"),
+        not_given("(5.8.4) as corrected, zenith delay of the troposphere at sea level", zenith,
+                  "m",
+                  "Saastamoinen: P0 + (1255 / T0 + 0.05) e0; standard atmosphere"),
+        info("(5.8.4) as printed, the same", None, printed, "m",
+             "P0 (1255 / T0 + 0.005) e0: a misprint"),
+        *(info(f"5.8, {what}", text, None, "", "said, nothing to compute") for what, text in said),
+    ]  # fmt: skip
 
 
 def _entries() -> page.Block:
@@ -268,7 +300,7 @@ def _figure(runs: dict[str, Run]) -> page.Block:
 
 PART: Final = Part(
     name="budget",
-    title="Error budget of GPS, tables 5.1 and 5.2; drift formula (6.1.3)",
-    source="5.8, 6.1; items 9, 12",
+    title="Errors of GPS, tables 5.1 and 5.2; drift formula (6.1.3)",
+    source="5.8, 6.1; items 8, 9, 12",
     run=run,
 )

@@ -112,7 +112,7 @@ def _ranges() -> list[Row]:
     )  # fmt: skip
     return [
         compared("(5.8.3), range free of the ionosphere, first form", 0.0, free - distance, "m",
-                 Tolerance(absolute=1e-6), "less the true one, 10 m of delay on L1, (5.8.1); rounding"),
+                 Tolerance(absolute=1e-6), "less the true one; 10 m of delay on L1, (5.8.1)"),
         compared("(5.8.3), the same, second form", 0.0, other - distance, "m",
                  Tolerance(absolute=1e-6), "less the true range; rounding at 2e7 m"),
         not_given("(5.8.4) as corrected, zenith delay of the troposphere at sea level", zenith,

@@ -156,7 +156,7 @@ def test_rates_of_the_turns_integrate_to_their_rotation_vectors():
 def test_settling_and_chatter_agree_with_the_extractions_own_simulation():
     """It has 19.8 s, 1.98 s, and 0.22, 0.67 deg of yaw, with the gradient's part along q.
 
-    That part takes up to a tenth of the normalised gradient: a slower way, a smaller chatter.
+    That part takes a share of the normalised gradient: a slower way, a smaller chatter.
     """
     found = rows("kinematic", "still")
     assert found["figure 13, settled within 5 deg"].here == pytest.approx(19.8, rel=0.1)

@@ -22,8 +22,9 @@ from strapdown.navigation.alignment.at_rest import (
     level,
     magnetic,
 )
-from strapdown.navigation.alignment.in_motion import course, velocity_matching
+from strapdown.navigation.alignment.matching import velocity_matching
 from strapdown.navigation.alignment.result import Alignment
+from strapdown.navigation.alignment.travel import course
 
 __all__ = [
     "Alignment",

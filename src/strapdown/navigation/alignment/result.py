@@ -1,5 +1,6 @@
-"""What an alignment returns, and the stretch of samples that it looks at."""
+"""What an alignment returns, and the stretch of samples and fixes that it looks at."""
 
+import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -99,6 +100,45 @@ def stretch(rec: Recording, span: tuple[float, float] | None) -> Stretch:
         where = "" if span is None else f" from {span[0]:g} to {span[1]:g} s"
         raise DataGap(f"stream imu must hold at least three valid samples{where}, got {len(imu)}.")
     return Stretch(imu.t, imu.gyr, imu.acc)
+
+
+class Fixes(NamedTuple):
+    """Fixes of a span, all with position and velocity."""
+
+    t: FloatArray
+    lla: FloatArray
+    v_n: FloatArray
+    std: FloatArray  # of each component of velocity [m/s]
+
+
+def fixes(rec: Recording, span: tuple[float, float] | None, velocity_std: float) -> Fixes:
+    """Return the fixes with velocity of a span."""
+    rec.need("imu")
+    gnss = rec.need("gnss")
+    default = _checks.positive("velocity_std", velocity_std)
+    first, last = (-math.inf, math.inf) if span is None else span
+    if not first < last:
+        raise ValueError(f"`span` must end after it starts, got {first:g} to {last:g} s.")
+    imu = rec.need("imu").t
+    if len(imu):
+        first, last = max(first, float(imu[0])), min(last, float(imu[-1]))
+    rows = (gnss.t >= first) & (gnss.t <= last) & np.isfinite(gnss.lla).all(axis=1)
+    if gnss.v_n is None:
+        raise InputError(
+            "stream gnss must have velocities to align in motion, it has positions only; "
+            "the filter 'loosely-coupled' aligns with positions as well."
+        )
+    rows &= np.isfinite(gnss.v_n).all(axis=1)
+    if np.count_nonzero(rows) < 2:
+        raise InputError(
+            f"the span must hold at least two fixes with velocity, got {np.count_nonzero(rows)}."
+        )
+    v_n = gnss.v_n[rows]
+    std = np.full(v_n.shape, default)
+    if gnss.std_velocity_n is not None:
+        stated = gnss.std_velocity_n[rows]
+        std = np.where(stated > 0.0, stated, std)
+    return Fixes(gnss.t[rows], gnss.lla[rows], v_n, std)
 
 
 def at_rest(rec: Recording, span: tuple[float, float] | None, test: RestTest) -> Stretch:

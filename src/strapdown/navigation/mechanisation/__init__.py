@@ -9,6 +9,7 @@ from strapdown.navigation.mechanisation.frames import (
 )
 from strapdown.navigation.mechanisation.increments import coning_sculling, means_from_points
 from strapdown.navigation.mechanisation.plane import PlaneSolution, mechanise_plane
+from strapdown.navigation.mechanisation.terms import VelocityTerms, velocity_terms
 
 __all__ = [
     "Mechanisation",
@@ -16,8 +17,10 @@ __all__ = [
     "PlaneSolution",
     "SphericalEarth",
     "Start",
+    "VelocityTerms",
     "coning_sculling",
     "means_from_points",
     "mechanise",
     "mechanise_plane",
+    "velocity_terms",
 ]

@@ -303,6 +303,27 @@ def test_velocity_matching_knows_the_turning_earth():
     assert np.abs(error).max() < 0.03 * DEG
 
 
+def test_heading_at_the_end_has_what_the_bias_turned_since_the_acceleration():
+    """Pulling away for 8 s shows heading; in the 50 s after it a bias of 0.1 deg/s turns 5 deg."""
+    t = np.arange(6001) / 100.0
+    speed = 2.5 * np.minimum(t, 8.0)
+    C = dcm_from_quat(quat_from_rpy([0.0, 0.0, 0.6]))
+    v_n = speed[:, None] * C[:, 0]
+    spin = OMEGA * np.array([np.cos(0.8), 0.0, -np.sin(0.8)])
+    f_n = np.where(t < 8.0, 2.5, 0.0)[:, None] * C[:, 0] + np.cross(2 * spin, v_n)
+    f_n[:, 2] -= drive.gravity(0.8, 0.0)
+    fixes = Gnss(
+        t=t[::50], lla=np.tile([0.8, 0.1, 0.0], (121, 1)), v_n=v_n[::50],
+        std_velocity_n=np.full((121, 3), 0.05),
+    )  # fmt: skip
+    rec = Recording(imu=Imu(t=t, gyr=np.tile(spin @ C, (len(t), 1)), acc=f_n @ C), gnss=fixes)
+    found = alignment.velocity_matching(
+        rec, gyr_bias_std=0.1 * DEG, acc_bias_std=0.001, arm_std=0.0, max_heading_std=1.0
+    )
+    assert found.std_n[2] == pytest.approx(0.1 * DEG * 56.0, rel=0.1)
+    assert np.abs(drive.attitude_error(found.q_nb, C)).max() < 0.1 * DEG
+
+
 def test_biases_are_found_with_the_attitude():
     bias = np.array([0.004, -0.006, 0.008])  # 0.2 to 0.5 deg/s: 15 deg in half a minute
     d = drive.simulate(

@@ -156,6 +156,30 @@ def test_an_accelerometer_bias_drifts_as_foretold():
     assert np.linalg.norm(drive.ned_error(sol.lla[-1], d.lla[-1])[:2]) < 0.02 * moved
 
 
+def test_level_and_bias_are_means_over_the_rest():
+    """Noise of 0.1 m/s^2 and a bias of half a degree per second; the first sample is as good."""
+    bias, rng = np.array([0.01, -0.006, 0.008]), np.random.default_rng(6)
+    d = drive.simulate(
+        seed=5, noise=0.0, duration=15.0, ramps=(), antenna_v=(0, 0, 0),
+        C_vb=drive.rotation((1, 2, -1), 0.8),
+    )  # fmt: skip
+    imu = d.rec.imu
+    gyr = imu.gyr + bias + 0.001 * rng.standard_normal(imu.gyr.shape)
+    acc = imu.acc + 0.1 * rng.standard_normal(imu.acc.shape)
+    rec = replace(d.rec, imu=replace(imu, gyr=gyr, acc=acc))
+    sol = DeadReckoning(heading=heading_of(d)).run(rec)
+    begin = int(np.flatnonzero(np.isfinite(sol.lla[:, 0]))[0])
+    first = drive.attitude_error(sol.q_nb[0], d.C_nb[0])
+    level = drive.attitude_error(sol.q_nb[begin], d.C_nb[begin])
+    # 0.1 / 9.81 of a radian in one sample, over the root of a thousand in their mean
+    assert np.abs(level[:2]).max() < 5 * 0.0102 / np.sqrt(1000)
+    assert np.abs(first[:2]).max() > 0.003
+    assert sol.gyr_bias[-1] == pytest.approx(bias, abs=5 * 0.001 / np.sqrt(1000))
+    # 4.9 s later: half a degree per second left in would have turned it by 2.5 deg
+    end = drive.attitude_error(sol.q_nb[-1], d.C_nb[-1])
+    assert np.abs(end - level).max() < 1e-3
+
+
 def test_held_height_stays():
     d = drive.simulate(seed=5, duration=60.0)
     sol = DeadReckoning(height="held").run(d.rec)

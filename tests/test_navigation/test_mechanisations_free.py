@@ -282,3 +282,24 @@ def test_every_form_starts_with_the_attitude_that_is_given():
             assert quat_from_dcm(dcm_from_quat(sol.q_nb[0])) == pytest.approx(
                 quat_from_dcm(dcm_from_quat(q_nb)), abs=1e-14
             )
+
+
+@pytest.mark.parametrize("attitude", ["quaternion", "dcm"])
+@pytest.mark.parametrize("sign", [1, -1])
+def test_the_order_of_turns_matters(attitude, sign):
+    """Pitch 90, yaw 90, pitch back 90 deg: a roll of 90 deg; the other way round, of -90 deg."""
+    step, seconds = 0.01, 1.0
+    t = np.arange(301) * step
+    gyr, acc = np.zeros((2, len(t), 3))
+    third = round(seconds / step)
+    gyr[1 : third + 1, 1] = sign * np.pi / 2
+    gyr[third + 1 : 2 * third + 1, 2] = np.pi / 2
+    gyr[2 * third + 1 :, 1] = -sign * np.pi / 2
+    earth = SphericalEarth(rate=0.0)
+    sol = mechanise(
+        (t, gyr, acc), START, attitude=attitude, earth=earth, gravity=0.0, compensate=False
+    )
+    rolled = dcm_from_quat(quat_from_rpy([sign * np.pi / 2, 0.0, 0.0]))
+    assert np.abs(dcm_from_quat(sol.q_nb[-1]) - rolled).max() < 1e-12
+    with pytest.raises(ComputationError, match="gimbal lock"):
+        mechanise((t, gyr, acc), START, attitude="euler", earth=earth, gravity=0.0)

@@ -5,16 +5,21 @@ from dataclasses import dataclass, field
 from typing import Any, Final, Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from strapdown import _checks
 from strapdown._types import FloatArray
 from strapdown.earth import dcm_ne
-from strapdown.errors import ComputationError, DataGap, InputError
+from strapdown.errors import ComputationError, InputError
 from strapdown.kernels.mechanisation import layout as k
 from strapdown.navigation.mechanisation import earth_model, increments
 from strapdown.navigation.mechanisation.earth_model import SphericalEarth
-from strapdown.recording import Imu, Recording
+from strapdown.navigation.mechanisation.inputs import (
+    Samples,
+    Start,
+    require_finite,
+    samples_after,
+    samples_of,
+)
 from strapdown.rotation import (
     dcm_from_quat,
     quat_from_dcm,
@@ -22,72 +27,12 @@ from strapdown.rotation import (
     rpy_from_quat,
 )
 from strapdown.solution import HEADING_REFERENCES, Solution
-from strapdown.truth import Truth
 from strapdown.units import DEG
 
 FRAMES: Final = ("inertial", "ecef", "ned", "wander")
 ATTITUDES: Final = ("quaternion", "dcm", "euler")
 SAMPLINGS: Final = ("mean", "points")
 NED_LIMIT: Final = 89.95 * DEG  # of latitude: 5.6 km from the pole
-
-Samples = Recording | Imu | tuple[ArrayLike, ArrayLike, ArrayLike]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Start:
-    """Where a mechanisation begins.
-
-    Parameters
-    ----------
-    lla : array_like, shape (3,)
-        Latitude, longitude [rad] and height [m]; on a spherical Earth the latitude is that of
-        the sphere.
-    q_nb : array_like, shape (4,)
-        Attitude, body to NED.
-    v_n : array_like, shape (3,)
-        Velocity over ground, north, east, down [m/s].
-    t : float, optional
-        Time of all this [s]; that of the first sample by default.
-    """
-
-    lla: ArrayLike
-    q_nb: ArrayLike
-    v_n: ArrayLike = (0.0, 0.0, 0.0)
-    t: float | None = None
-
-    def __post_init__(self) -> None:
-        """Check shapes and values."""
-        lla = _checks.as_vector("lla", self.lla)
-        if abs(lla[0]) > math.pi / 2 * (1.0 + 1e-15):
-            raise ValueError(
-                f"latitude in `lla` must lie in [-pi/2, pi/2] rad, got {lla[0]:g}; "
-                "if it is in degrees, multiply it by DEG."
-            )
-        q_nb = _checks.as_quats("q_nb", _checks.as_vector("q_nb", self.q_nb, 4))
-        object.__setattr__(self, "lla", lla)
-        object.__setattr__(self, "q_nb", q_nb)
-        object.__setattr__(self, "v_n", _checks.as_vector("v_n", self.v_n))
-        if self.t is not None:
-            object.__setattr__(self, "t", _checks.finite("t", self.t))
-
-    @classmethod
-    def of(cls, sol: Solution | Truth, row: int = 0) -> "Start":
-        """Return the start that a row of a navigation solution or of a truth gives.
-
-        Parameters
-        ----------
-        sol : Solution or Truth
-            With position and velocity.
-        row : int
-            Which row; -1 is the last.
-
-        Returns
-        -------
-        Start
-        """
-        if sol.lla is None or sol.v_n is None:
-            raise ValueError("`sol` must have position and velocity, this one has attitude only.")
-        return cls(t=float(sol.t[row]), lla=sol.lla[row], v_n=sol.v_n[row], q_nb=sol.q_nb[row])
 
 
 class MechanisationState(NamedTuple):
@@ -295,9 +240,9 @@ class Mechanisation:
                 "`sampling` must be 'mean' to go piece by piece: points are joined by a spline "
                 "over the whole recording; use `run`."
             )
-        t, gyr, acc = _samples(rec)
+        t, gyr, acc = samples_of(rec)
         x = state.x.copy()
-        out = self._integrate(x, self._p, *_after(t, gyr, acc, state.t, self.max_gap))
+        out = self._integrate(x, self._p, *samples_after(t, gyr, acc, state.t, self.max_gap))
         return self._solution(out), MechanisationState(x)
 
     def run(self, rec: Samples, start: Start) -> Solution:
@@ -314,7 +259,7 @@ class Mechanisation:
         -------
         Solution
         """
-        t, gyr, acc = _samples(rec)
+        t, gyr, acc = samples_of(rec)
         if len(t) == 0:
             raise InputError("`rec` must hold inertial samples, it has none.")
         first = float(t[0]) if start.t is None else start.t
@@ -324,7 +269,7 @@ class Mechanisation:
                 f"got {first:g}."
             )
         if self.sampling == "points" and len(t) > 1:
-            _require_finite(t, gyr, acc)
+            require_finite(t, gyr, acc)
             gyr = increments.means_from_points(t, gyr)
             acc = increments.means_from_points(t, acc)
         x = self.init(Start(lla=start.lla, q_nb=start.q_nb, v_n=start.v_n, t=first)).x
@@ -332,7 +277,7 @@ class Mechanisation:
         if self._p[k.FIRST] > 0.0 and t[at] == first:
             # the sample that ends at the start is the one before the first
             x[k.TH : k.TH + 3], x[k.DV : k.DV + 3], x[k.BEFORE] = gyr[at], acc[at], 1.0
-        t, gyr, acc = _after(t, gyr, acc, first, self.max_gap)
+        t, gyr, acc = samples_after(t, gyr, acc, first, self.max_gap)
         rows = [_row(x, self._p)]
         rows.append(self._integrate(x, self._p, t, gyr, acc))
         left = int(x[k.COUNT] - self._p[k.FIRST])
@@ -477,50 +422,3 @@ def _row(x: FloatArray, p: FloatArray) -> FloatArray:
     w = np.zeros(k.W_SIZE)
     tell(x, p, w)
     return np.concatenate((x[k.T : k.T + 1], w[k.OUT : k.OUT + 10]))[np.newaxis]
-
-
-def _samples(rec: Samples) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return time, rates and specific forces of whatever holds them."""
-    if isinstance(rec, Recording):
-        rec = rec.need("imu")
-    if isinstance(rec, Imu):
-        return rec.t, rec.gyr, rec.acc
-    if not isinstance(rec, tuple) or len(rec) != 3:
-        raise TypeError(
-            "`rec` must be a Recording, an Imu or a tuple (t, gyr, acc), "
-            f"got {type(rec).__name__}."
-        )
-    gyr = _checks.as_samples("gyr", rec[1], allow_nan=True)
-    acc = _checks.as_samples("acc", rec[2], allow_nan=True)
-    t = _checks.as_times("t", rec[0])
-    _checks.same_length(t=t, gyr=gyr, acc=acc)
-    return t, gyr, acc
-
-
-def _after(
-    t: FloatArray, gyr: FloatArray, acc: FloatArray, start: float, max_gap: float
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return the samples after a time, all of them fit for integration."""
-    first = int(np.searchsorted(t, start, side="right"))
-    t, gyr, acc = (np.ascontiguousarray(part[first:]) for part in (t, gyr, acc))
-    _require_finite(t, gyr, acc)
-    steps = np.diff(t, prepend=start)
-    if len(t) and steps.max() > max_gap:
-        row = int(np.argmax(steps > max_gap))
-        raise DataGap(
-            f"stream imu has no samples for {steps[row]:.3g} s before {t[row]:g} s, longer than "
-            f"`max_gap` of {max_gap:g} s; begin again after the gap, or raise `max_gap` to take "
-            "the motion in it as uniform."
-        )
-    return t, gyr, acc
-
-
-def _require_finite(t: FloatArray, gyr: FloatArray, acc: FloatArray) -> None:
-    for name, samples in (("gyr", gyr), ("acc", acc)):
-        bad = ~np.isfinite(samples).all(axis=1)
-        if bad.any():
-            row = int(np.argmax(bad))
-            raise ValueError(
-                f"`{name}` must be finite for dead reckoning, got {samples[row]} at {t[row]:g} s; "
-                "leave such rows out: the next sample then covers their time."
-            )

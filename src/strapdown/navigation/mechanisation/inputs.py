@@ -1,0 +1,121 @@
+"""What goes into a mechanisation: where it begins, and samples fit for integration."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from strapdown import _checks
+from strapdown._types import FloatArray
+from strapdown.errors import DataGap
+from strapdown.recording import Imu, Recording
+from strapdown.solution import Solution
+from strapdown.truth import Truth
+
+Samples = Recording | Imu | tuple[ArrayLike, ArrayLike, ArrayLike]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Start:
+    """Where a mechanisation begins.
+
+    Parameters
+    ----------
+    lla : array_like, shape (3,)
+        Latitude, longitude [rad] and height [m]; on a spherical Earth the latitude is that of
+        the sphere.
+    q_nb : array_like, shape (4,)
+        Attitude, body to NED.
+    v_n : array_like, shape (3,)
+        Velocity over ground, north, east, down [m/s].
+    t : float, optional
+        Time of all this [s]; that of the first sample by default.
+    """
+
+    lla: ArrayLike
+    q_nb: ArrayLike
+    v_n: ArrayLike = (0.0, 0.0, 0.0)
+    t: float | None = None
+
+    def __post_init__(self) -> None:
+        """Check shapes and values."""
+        lla = _checks.as_vector("lla", self.lla)
+        if abs(lla[0]) > math.pi / 2 * (1.0 + 1e-15):
+            raise ValueError(
+                f"latitude in `lla` must lie in [-pi/2, pi/2] rad, got {lla[0]:g}; "
+                "if it is in degrees, multiply it by DEG."
+            )
+        q_nb = _checks.as_quats("q_nb", _checks.as_vector("q_nb", self.q_nb, 4))
+        object.__setattr__(self, "lla", lla)
+        object.__setattr__(self, "q_nb", q_nb)
+        object.__setattr__(self, "v_n", _checks.as_vector("v_n", self.v_n))
+        if self.t is not None:
+            object.__setattr__(self, "t", _checks.finite("t", self.t))
+
+    @classmethod
+    def of(cls, sol: Solution | Truth, row: int = 0) -> "Start":
+        """Return the start that a row of a navigation solution or of a truth gives.
+
+        Parameters
+        ----------
+        sol : Solution or Truth
+            With position and velocity.
+        row : int
+            Which row; -1 is the last.
+
+        Returns
+        -------
+        Start
+        """
+        if sol.lla is None or sol.v_n is None:
+            raise ValueError("`sol` must have position and velocity, this one has attitude only.")
+        return cls(t=float(sol.t[row]), lla=sol.lla[row], v_n=sol.v_n[row], q_nb=sol.q_nb[row])
+
+
+def samples_of(rec: Samples) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return time, rates and specific forces of whatever holds them."""
+    if isinstance(rec, Recording):
+        rec = rec.need("imu")
+    if isinstance(rec, Imu):
+        return rec.t, rec.gyr, rec.acc
+    if not isinstance(rec, tuple) or len(rec) != 3:
+        raise TypeError(
+            "`rec` must be a Recording, an Imu or a tuple (t, gyr, acc), "
+            f"got {type(rec).__name__}."
+        )
+    gyr = _checks.as_samples("gyr", rec[1], allow_nan=True)
+    acc = _checks.as_samples("acc", rec[2], allow_nan=True)
+    t = _checks.as_times("t", rec[0])
+    _checks.same_length(t=t, gyr=gyr, acc=acc)
+    return t, gyr, acc
+
+
+def samples_after(
+    t: FloatArray, gyr: FloatArray, acc: FloatArray, start: float, max_gap: float
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return the samples after a time, all of them fit for integration."""
+    first = int(np.searchsorted(t, start, side="right"))
+    t, gyr, acc = (np.ascontiguousarray(part[first:]) for part in (t, gyr, acc))
+    require_finite(t, gyr, acc)
+    steps = np.diff(t, prepend=start)
+    if len(t) and steps.max() > max_gap:
+        row = int(np.argmax(steps > max_gap))
+        raise DataGap(
+            f"stream imu has no samples for {steps[row]:.3g} s before {t[row]:g} s, longer than "
+            f"`max_gap` of {max_gap:g} s; begin again after the gap, or raise `max_gap` to take "
+            "the motion in it as uniform."
+        )
+    return t, gyr, acc
+
+
+def require_finite(t: FloatArray, gyr: FloatArray, acc: FloatArray) -> None:
+    """Refuse a sample that is not finite, with its time."""
+    for name, samples in (("gyr", gyr), ("acc", acc)):
+        bad = ~np.isfinite(samples).all(axis=1)
+        if bad.any():
+            row = int(np.argmax(bad))
+            raise ValueError(
+                f"`{name}` must be finite for dead reckoning, got {samples[row]} at {t[row]:g} s; "
+                "leave such rows out: the next sample then covers their time."
+            )

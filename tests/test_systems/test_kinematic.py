@@ -173,6 +173,17 @@ def test_random_walk_of_the_angle_is_sigma_sqrt_dt_t():
         assert here == pytest.approx(want, rel=0.08)  # 1000 records: 2.2 % each, 3.5 sigma
 
 
+def test_no_yaw_of_a_level_sensor_shows_a_turn_about_x_about_z_without_y():
+    """The remark on figure 17, over all yaws and turns of up to 80 deg, by SciPy."""
+    for yaw in np.radians(np.arange(-180.0, 180.0, 7.0)):
+        rest = Rotation.from_euler("Z", yaw)
+        for turn in np.radians([5.0, 20.0, 45.0, 80.0]):
+            out = rest * Rotation.from_rotvec([turn, 0.0, 0.0])
+            before, after = (r.inv().as_euler("ZYX") for r in (rest, out))
+            z, y, _ = (after - before + np.pi) % (2.0 * np.pi) - np.pi
+            assert abs(z) < abs(y) + 1e-9
+
+
 # --- wrong inputs -----------------------------------------------------------------------
 
 

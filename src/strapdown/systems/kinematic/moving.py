@@ -145,8 +145,8 @@ def _external_frame(sol: Solution) -> list[Row]:
         worded("figure 17, turn about the sensor's x, angles by (21) to (23) of q",
                "shows about x and z", _three(frame), same=seen == ["x", "z"],
                from_simulation=True, tolerance="shows: over 5 deg",
-               remark="angles of the Earth in the sensor; at the yaw of tables 4 and 5 the turn "
-               "shows about y too. Size of the turn and rest pose of that record are not printed"),
+               remark="angles of the Earth in the sensor; at no yaw does a level sensor show such "
+               "a turn about z without y. Size of the turn and rest pose are not printed"),
         info("figure 17, the same turn, angles of the sensor in the Earth", "about x and z",
              _three(sensor), "",
              "by (21) to (23) of the conjugate: a level turn about x is roll alone at any yaw, so "

@@ -10,12 +10,18 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields
 from importlib import import_module
 from types import ModuleType
-from typing import Any, ClassVar, NamedTuple, Protocol, Self, TypeVar
+from typing import Any, ClassVar, Protocol, Self, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from strapdown import _checks
+from strapdown._from_sensor import Noisy as Noisy
+from strapdown._from_sensor import Taken as Taken
+from strapdown._from_sensor import parameters_of
+from strapdown._tracker import ABSENT, NO_VECTOR, as_kernel_input, wrong_lengths
+from strapdown._tracker import State as State
+from strapdown._tracker import Tracker as Tracker
 from strapdown._types import FloatArray, IntArray
 from strapdown.errors import MissingStream
 from strapdown.kernels import memory as _m
@@ -24,8 +30,6 @@ from strapdown.kernels._jit import is_compiled
 from strapdown.recording import Imu, Recording
 from strapdown.solution import COLUMNS, Diagnostics, Solution
 
-_NO_VECTOR: FloatArray = np.empty(0)
-_ABSENT: FloatArray = np.full(3, np.inf)  # no sample, as against a bad one
 _NO_TIMES: FloatArray = np.empty(0)
 _NO_ROWS: FloatArray = np.empty((0, 3))
 _NO_EVENTS: FloatArray = np.empty((0, 3))
@@ -47,130 +51,6 @@ CELLS: Mapping[str, int] = {
 }
 
 
-class State(NamedTuple):
-    """All that an estimator remembers between two samples.
-
-    ``np.savez(file, **state._asdict())`` saves it, ``State(**np.load(file))`` restores it.
-
-    Attributes
-    ----------
-    name : str
-        Registry name of the estimator it belongs to.
-    x : ndarray, shape (m,)
-        Its memory; `strapdown.kernels.memory` names the cells.
-    P : ndarray, shape (s, s)
-        Covariance of its error state, (0, 0) if it has none.
-    """
-
-    name: str
-    x: FloatArray
-    P: FloatArray
-
-    @property
-    def t(self) -> float:
-        """Time of the last sample used [s]; NaN before the first."""
-        return float(self.x[_m.T])
-
-    @property
-    def q_nb(self) -> FloatArray:
-        """Attitude, body to NED, shape (4,)."""
-        return self.x[_m.Q : _m.Q + 4].copy()
-
-    @property
-    def gyr_bias(self) -> FloatArray:
-        """Gyro bias in b, shape (3,) [rad/s]."""
-        return self.x[_m.BG : _m.BG + 3].copy()
-
-    @property
-    def status(self) -> int:
-        """`Status` bits of the last sample."""
-        return int(self.x[_m.STATUS])
-
-
-class Tracker:
-    """The stateful form of an estimator, for real-time code: one call per sample.
-
-    Parameters
-    ----------
-    estimator : Estimator
-        Whose parameters and kernel it uses.
-    state : State, optional
-        Where to begin; knows nothing by default.
-    """
-
-    __slots__ = ("_P", "_name", "_p", "_q", "_t", "_update", "_w", "_x")
-
-    def __init__(self, estimator: "Estimator", state: State | None = None) -> None:
-        state = estimator._own(estimator.init() if state is None else state)
-        self._update, self._p, self._w = estimator._ready()
-        self._name, self._x, self._P = state.name, state.x.copy(), state.P.copy()
-        self._t = -math.inf if math.isnan(state.t) else state.t
-        self._q = self._x[_m.Q : _m.Q + 4]  # a view
-
-    def update(
-        self,
-        t: float,
-        gyr: ArrayLike | None,
-        acc: ArrayLike | None,
-        mag: ArrayLike | None = None,
-    ) -> None:
-        """Feed one sample.
-
-        Parameters
-        ----------
-        t : float
-            Time [s], later than that of the sample before.
-        gyr : array_like, shape (3,), or None
-            Angular rate [rad/s]; float64 arrays are the quickest. None where a slower
-            gyroscope has no new sample.
-        acc : array_like, shape (3,), or None
-            Specific force [m/s^2]; None where a slower accelerometer has no new sample.
-        mag : array_like, shape (3,), optional
-            Magnetic field [T], if there is a new one.
-
-        Raises
-        ------
-        ValueError
-            If time does not increase or a vector has not three components.
-        """
-        if not self._t < t < math.inf:
-            raise ValueError(f"`t` must increase, got {t} after {self._t}.")
-        if mag is None:
-            mag = _NO_VECTOR
-        if acc is None:
-            acc = _ABSENT
-        if gyr is None:
-            gyr = _ABSENT
-        try:
-            ok = self._update(self._x, self._P, self._p, self._w, t, gyr, acc, mag)
-        except TypeError:  # not float64 vectors
-            t, gyr, acc, mag = _as_kernel_input(t, gyr, acc, mag)
-            ok = self._update(self._x, self._P, self._p, self._w, t, gyr, acc, mag)
-        if not ok:
-            raise _wrong_lengths(gyr, acc, mag)
-        self._t = t
-
-    @property
-    def state(self) -> State:
-        """A copy of what it remembers."""
-        return State(self._name, self._x.copy(), self._P.copy())
-
-    @property
-    def q_nb(self) -> FloatArray:
-        """Attitude, body to NED, shape (4,)."""
-        return self._q.copy()
-
-    @property
-    def gyr_bias(self) -> FloatArray:
-        """Gyro bias in b, shape (3,) [rad/s]."""
-        return self._x[_m.BG : _m.BG + 3].copy()
-
-    @property
-    def status(self) -> int:
-        """`Status` bits of the last sample."""
-        return int(self._x[_m.STATUS])
-
-
 class KernelModule(Protocol):
     """What a module under `strapdown.kernels` offers to be an estimator."""
 
@@ -178,35 +58,6 @@ class KernelModule(Protocol):
     run: Any
     step: Any
     update: Any
-
-
-class Taken(NamedTuple):
-    """How a parameter follows from the noise of a sensor: ``factor * quantity``.
-
-    Attributes
-    ----------
-    parameter : str
-        Of the estimator.
-    quantity : str
-        Of `strapdown.sensors.NoiseParameters`.
-    factor : float
-        From the quantity to the parameter.
-    floor : bool
-        The parameter stands for motion, vibration or the room besides the sensor's own noise:
-        the default stays where it is the larger.
-    """
-
-    parameter: str
-    quantity: str
-    factor: float = 1.0
-    floor: bool = False
-
-
-class Noisy(Protocol):
-    """What knows the noise of a sensor: a device of `sensors`, a record of `noise`."""
-
-    def noise_parameters(self) -> Any:
-        """Return `strapdown.sensors.NoiseParameters`."""
 
 
 class Estimator:
@@ -253,8 +104,13 @@ class Estimator:
         TypeError
             If `sensor` is neither a device nor a noise record.
         """
-        values = _from_sensor(cls, sensor)
-        return cls(**{**values, **parameters})
+        if not cls.FROM_SENSOR:
+            takers = (e.name for e in entries() if e.cls.FROM_SENSOR)
+            raise ValueError(
+                f"{cls.NAME} has no noise parameter that a sensor could fill; set its gains, or "
+                f"take one of {', '.join(takers)}."
+            )
+        return cls(**{**parameters_of(cls, sensor), **parameters})
 
     @staticmethod
     def _kernel() -> Any:
@@ -404,18 +260,18 @@ class Estimator:
             )
         update, p, w = self._ready()
         if mag is None:
-            mag = _NO_VECTOR
+            mag = NO_VECTOR
         if acc is None:
-            acc = _ABSENT
+            acc = ABSENT
         if gyr is None:
-            gyr = _ABSENT
+            gyr = ABSENT
         try:
             ok = update(x, P, p, w, t, gyr, acc, mag)
         except TypeError:  # not float64 vectors
-            t, gyr, acc, mag = _as_kernel_input(t, gyr, acc, mag)
+            t, gyr, acc, mag = as_kernel_input(t, gyr, acc, mag)
             ok = update(x, P, p, w, t, gyr, acc, mag)
         if not ok:
-            raise _wrong_lengths(gyr, acc, mag)
+            raise wrong_lengths(gyr, acc, mag)
         return State(state.name, x, P)
 
     def tracker(self, state: State | None = None) -> Tracker:
@@ -519,56 +375,6 @@ def real_samples(imu: Imu) -> tuple[FloatArray, FloatArray]:
     if imu.acc_real is not None:
         acc = np.where(imu.acc_real[:, None], acc, np.inf)
     return gyr, acc
-
-
-def _from_sensor(cls: type[Estimator], sensor: Noisy) -> dict[str, float]:
-    """Return the parameters that a sensor's noise gives."""
-    if not cls.FROM_SENSOR:
-        raise ValueError(
-            f"{cls.NAME} has no noise parameter that a sensor could fill; set its gains, or take "
-            f"one of {', '.join(e.name for e in entries() if e.cls.FROM_SENSOR)}."
-        )
-    if not hasattr(sensor, "noise_parameters"):
-        raise TypeError(
-            "`sensor` must be a device such as strapdown.sensors.preset('mpu6050'), or a noise "
-            f"record such as strapdown.noise.load('noise.toml'), got {sensor!r}."
-        )
-    noise = sensor.noise_parameters()
-    defaults = {f.name: f.default for f in fields(cls)}  # type: ignore[arg-type]
-    values: dict[str, float] = {}
-    for parameter, quantity, factor, floor in cls.FROM_SENSOR:
-        value = factor * getattr(noise, quantity)
-        if not math.isnan(value):
-            values[parameter] = max(value, defaults[parameter]) if floor else value
-    if not values:
-        asked = ", ".join(taken.quantity for taken in cls.FROM_SENSOR)
-        raise ValueError(
-            f"`sensor` must state a noise that {cls.NAME} takes ({asked}), got "
-            f"{getattr(sensor, 'name', type(sensor).__name__)}, which states none of them."
-        )
-    return values
-
-
-def _as_kernel_input(
-    t: float, gyr: ArrayLike, acc: ArrayLike, mag: ArrayLike
-) -> tuple[float, FloatArray, FloatArray, FloatArray]:
-    """Return a sample in the types that kernels are compiled for."""
-    if np.shape(mag) == (0,):
-        mag = _NO_VECTOR
-    else:
-        mag = np.array(_checks.as_vector("mag", mag, allow_nan=True))
-    return (
-        _checks.finite("t", t),
-        gyr if gyr is _ABSENT else np.array(_checks.as_vector("gyr", gyr, allow_nan=True)),
-        acc if acc is _ABSENT else np.array(_checks.as_vector("acc", acc, allow_nan=True)),
-        mag,
-    )
-
-
-def _wrong_lengths(*vectors: Any) -> ValueError:
-    """Return the error for vectors that have not three components."""
-    shapes = ", ".join(str(np.shape(v)) for v in vectors)
-    return ValueError(f"`gyr`, `acc` and `mag` must have shape (3,), got {shapes}.")
 
 
 def kept_facts(rec: Recording) -> dict[str, Any]:

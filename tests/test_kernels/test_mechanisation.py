@@ -248,14 +248,14 @@ def test_sub_samples_are_one_to_four():
 # --- Earth --------------------------------------------------------------------------------------
 
 PLACES = [(-60.0, 20.0, 100.0), (0.0, -120.0, 0.0), (30.0, 179.9, 9000.0), (89.9, 5.0, -50.0),
-          (-90.0, 0.0, 300.0), (45.0, 0.0, 80e3)]  # fmt: skip
+          (-90.0, 0.0, 300.0), (45.0, 0.0, 80e3), (-37.0, 77.0, 2e7)]  # fmt: skip
 
 
 @pytest.mark.parametrize(("lat", "lon", "h"), PLACES)
 def test_latitude_and_height_are_those_of_pyproj(lat, lon, h):
     to_ecef = pyproj.Transformer.from_crs("EPSG:4979", "EPSG:4978")
     s, c, out, height = ellipsoid.normal(parameters(), *to_ecef.transform(lat, lon, h))
-    assert height == pytest.approx(h, abs=3e-9)  # three units in the last place of the radius
+    assert height == pytest.approx(h, abs=8e-9)  # two units in the last place
     assert np.degrees(np.arctan2(s, c)) == pytest.approx(lat, abs=2e-14)
     assert out >= 0.0
 

@@ -48,7 +48,7 @@ def gravity(p: Vec, s2: float, height: float) -> float:
 def normal(p: Vec, x: float, y: float, z: float) -> tuple[float, float, float, float]:
     """Sine and cosine of latitude, distance from the axis and height of a point in ECEF [m].
 
-    Two rounds of Bowring's formula [1]_: exact to rounding up to 100 km above the ground.
+    Two rounds of Bowring's formula [1]_: exact to rounding, on the ground and in orbit.
     """
     a, e2 = p[A], p[E2]
     flat = sqrt(1.0 - e2)

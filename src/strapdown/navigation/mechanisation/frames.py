@@ -94,7 +94,8 @@ class Mechanisation:
     Online but for points. For a motion with smooth rates the error falls with the fourth power
     of the step from two samples on, with the third for one, with the second without
     compensation; the slow terms of the frame's own turn are of second order and make micrometres
-    at 100 Hz. Sub-samples are taken as equally long.
+    at 100 Hz. Sub-samples are taken as equally long. Where the accelerometer is slower than the
+    gyroscope, its held samples count as they stand, half of its interval late.
 
     References
     ----------

@@ -13,8 +13,8 @@ Letter Frame, right-handed
 ``e``  Earth-centred Earth-fixed (ECEF): x to latitude 0, longitude 0; z to the north pole.
 ``n``  Local level **north, east, down** (NED) at the sensor. "North" is true, magnetic or
        arbitrary; `Solution.heading_reference` says which.
-``w``  Wander azimuth: level like n, but its x axis keeps still over the Earth's vertical
-       instead of following north; for mechanisations near a pole.
+``w``  Wander azimuth: level like n, but not turned about the vertical to follow north; for
+       mechanisations near a pole.
 ``b``  Body: the **axes of the sensor as recorded**. A log may be z-up; nothing turns it.
 ``v``  Vehicle: forward, right, down. Roll, pitch and yaw of a vehicle are those of v; the
        mount ``q_vb`` leads to it.

@@ -101,6 +101,25 @@ def test_rejection_is_a_parameter_and_stands_in_the_diagnostics(reject):
     assert (turned < 1e-12) == reject
 
 
+def test_field_that_is_off_again_and_again_is_flagged_but_used():
+    """As of a magnetometer with iron on the box: its field depends on the attitude."""
+    flt = Mahony(kp=1e-3, ki=0.0, reject_disturbed=True)
+    x, P = start(flt, scalar_first(R_NB))
+    outcomes = []
+    for k in range(600):  # 2 s as usual, 2 s off
+        field = (1.0 if (k // 20) % 2 == 0 else 1.5) * hand.FIELD_N
+        w = feed(flt, x, P, (k + 1) * DT, np.zeros(3), ACC, R_NB.inv().apply(field))
+        outcomes.append((int(w[m.D_MAG + 6]), int(x[m.STATUS]) & s.MAG_DISTURBED))
+    off = [k for k in range(600) if (k // 20) % 2 == 1]
+    assert all(outcomes[k][1] for k in off)
+    # every 4 s, forgotten with 60 s: (1 - r^n) / (1 - r), r = exp(-4 / 60), passes 8 at n = 12
+    r = np.exp(-4.0 / 60.0)
+    n = int(np.ceil(np.log(1.0 - 8.0 * (1.0 - r)) / np.log(r)))
+    twelfth = 40 * (n - 1) + 20
+    assert {outcomes[k][0] for k in off if k < twelfth} == {s.REJECTED_DISTURBED}
+    assert {outcomes[k][0] for k in off if k >= twelfth} == {s.ACCEPTED}
+
+
 # --- a gyroscope slower than the accelerometer -------------------------------------------
 
 

@@ -150,7 +150,7 @@ def test_cells_of_the_memory_lie_side_by_side():
         (m.OMEGA, 3), (m.DT, 1), (m.ALIGNED, 1), (m.MAG, 4), (m.STAR, 5), (m.GNSS, 15),
         (m.BARO, 2), (m.SPEED, 2), (m.AIRSPEED, 2), (m.T_FIELD, 1),
         (m.FIELD, 2), (m.FIELD_NEW, 2), (m.FIELD_HELD, 1), (m.FIELD_WAIT, 1), (m.AHEAD, 1),
-        (m.STUCK, 1), (m.HEAD, 0),
+        (m.STUCK, 1), (m.ONSETS, 2), (m.HEAD, 0),
     ]  # fmt: skip
     end = 0
     for first, count in cells:

@@ -24,7 +24,8 @@ class AttitudeEstimator(Estimator):
         Heading of magnetic north, east positive [rad]. Given, heading is true; None, magnetic.
     reject_disturbed : bool
         Whether a field whose strength is a fifth, or whose dip is 11 deg off the usual one is
-        left out, not only flagged. What stays the same for half a minute becomes usual.
+        left out, not only flagged. What stays the same for half a minute becomes usual; a field
+        that is off again and again is a magnetometer to be calibrated, and is used.
     max_gap : float
         A longer interval between samples [s] is a gap: covariance is widened, or, where there
         is none, attitude is aligned again and the bias kept.

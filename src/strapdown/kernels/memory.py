@@ -7,6 +7,7 @@ head of `x` is laid out here, the same for all; a filter's own states follow fro
 """
 
 from math import atan2, cos, isinf, isnan, nan, sin, sqrt
+from math import exp as exp_  # `exp` is a rotation's
 
 from strapdown.kernels import status as s
 from strapdown.kernels._jit import Mat, Vec, inlined_kernel, kernel
@@ -42,7 +43,8 @@ FIELD_HELD = 77  # how long it has stayed the same [s]
 FIELD_WAIT = 78  # how long the field must still be as usual to be trusted [s]
 AHEAD = 79  # how far the attitude is carried on by a held rate [s]
 STUCK = 80  # how long a rate of zero is still doubted [s]
-HEAD = 81
+ONSETS = 81  # how often the field was disturbed of late, and the time of the last [s]: 2
+HEAD = 83
 
 # --- how far alignment is -----------------------------------------------------------------
 NO = 0.0
@@ -88,6 +90,8 @@ FIELD_OFF = 0.2  # so far off, relative, it is disturbed: a fifth of its strengt
 FIELD_TIME = 10.0  # time constant of the usual field while nothing disturbs [s]
 FIELD_STEADY = 30.0  # a disturbed field that stays the same for so long becomes usual [s]
 FIELD_AGAIN = 1.0  # after a disturbance it must be as usual for so long [s]
+FIELD_RECENT = 60.0  # time constant of "of late" [s]
+FIELD_OFTEN = 8.0  # disturbed so often of late, it is the magnetometer that is not calibrated
 FIELD_MISSING = 5.0  # without a valid sample for so long the field is missing [s]
 
 
@@ -241,6 +245,10 @@ def _differs(h: float, d: float, usual_h: float, usual_d: float) -> bool:
 @kernel
 def _watch_disturbed(x: Vec, h: float, d: float, dt: float) -> None:
     """Take a field that is not as usual for the usual one once it has long stayed the same."""
+    if x[FIELD_WAIT] < FIELD_AGAIN:  # the sample before was as usual
+        t = x[T_FIELD]
+        x[ONSETS] = 1.0 + x[ONSETS] * exp_(-(t - x[ONSETS + 1]) / FIELD_RECENT)
+        x[ONSETS + 1] = t
     x[FIELD_WAIT] = FIELD_AGAIN
     if x[FIELD_HELD] == 0.0 or _differs(h, d, x[FIELD_NEW], x[FIELD_NEW + 1]):
         x[FIELD_NEW], x[FIELD_NEW + 1] = h, d
@@ -275,7 +283,7 @@ def watch_field(x: Vec, t: float, m2: float) -> int:
         bits = s.MAG_DISTURBED
     elif x[FIELD_WAIT] > 0.0:
         x[FIELD_HELD] = 0.0
-        x[FIELD_WAIT] -= dt
+        x[FIELD_WAIT] = max(x[FIELD_WAIT] - dt, 0.0)
         bits = s.MAG_DISTURBED
     else:
         k = dt / (FIELD_TIME + dt)
@@ -351,7 +359,7 @@ def begin(
     if has_mag and x[ALIGNED] != NO:
         field_bits = watch_field(x, t, m2)
         bits |= field_bits
-        if field_bits != 0 and p[P_REJECT] > 0.0:
+        if field_bits != 0 and p[P_REJECT] > 0.0 and x[ONSETS] < FIELD_OFTEN:
             has_mag = False
             note(w, D_MAG, nan, nan, nan, s.REJECTED_DISTURBED)
     elif t - x[T_FIELD] > FIELD_MISSING and x[FIELD] + abs(x[FIELD + 1]) > 0.0:

@@ -287,6 +287,8 @@ def test_unseen_rates_widen_the_covariance(clipped, gap):
     P[:] = 0.0
     dt = 0.5 if gap else 0.1
     feed(flt, x, P, dt, [0.0, 0.0, 10.0 if clipped else 9.9], np.full(3, np.inf))
-    want = flt.gyr_noise**2 * dt + ((0.5 * dt) ** 2 if clipped or gap else 0.0)
+    # over a gap a constant rate is unseen, beyond the range one that stays for 0.25 s
+    hidden = (0.5 * dt) ** 2 if gap else (2 * 0.25 * 0.5**2 * dt if clipped else 0.0)
+    want = flt.gyr_noise**2 * dt + hidden
     assert P[2, 2] == pytest.approx(want, rel=1e-4)  # and K^2 dt^3 / 3
     assert mekf.P_SIZE == k.P_STD_STAR

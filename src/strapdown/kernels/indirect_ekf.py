@@ -6,14 +6,13 @@ the front; and its error ``dq x q`` is ``q_nb dq`` here. Equation numbers are th
 (thesis "three-axis platform", chapter 7). Layouts of `P`, `p` and scratch begin as the MEKF's.
 """
 
-from math import cos, inf, pi, sin, sqrt
+from math import cos, inf, sin, sqrt
 
 from strapdown.kernels import status as s
 from strapdown.kernels._jit import Mat, Vec, kernel
 from strapdown.kernels.mekf import (
     P_ACC_NOISE,
     P_BIAS_NOISE,
-    P_GAP_RATE,
     P_GATE,
     P_GRAVITY,
     P_GYR_NOISE,
@@ -30,6 +29,7 @@ from strapdown.kernels.mekf import (
     reset_attitude,
     reset_heading,
     transition,
+    unseen,
     update_scalar,
     write_std,
 )
@@ -322,9 +322,8 @@ def step(
         x[T_MAG] = x[T]
     propagate(P, w, p, rx, ry, rz, dt)
     if (int(x[STATUS]) & (s.SATURATED | s.GYR_STUCK)) != 0:
-        unknown = p[P_GAP_RATE] * dt
         for i in range(3):
-            P[i, i] += min(unknown * unknown, pi * pi)
+            P[i, i] += unseen(p, dt)
     if (int(x[STATUS]) & s.GAP) != 0:
         bridge_gap(x, P, p, dt, has_acc, ax, ay, az)
     if todo == START:  # the first field, or the first after a gap, has just set the heading

@@ -61,6 +61,8 @@ P_STD_TILT = P_HEAD + 7  # [rad]
 P_STD_HEADING = P_HEAD + 8  # [rad]
 P_SIZE = P_HEAD + 9
 
+UNSEEN_TIME = 0.25  # correlation time of a rate beyond the range, or of one that sticks [s]
+
 # --- scratch -----------------------------------------------------------------------------
 W_A = W_HEAD  # transition of dtheta: 3x3
 W_B = W_HEAD + 9  # influence of dbg on dtheta: 3x3
@@ -259,6 +261,13 @@ def reset_heading(x: Vec, P: Mat, variance: float) -> None:
     P[1, 2] = P[2, 1]
 
 
+@kernel
+def unseen(p: Vec, dt: float) -> float:
+    """Variance that a sample adds whose rate was not seen: one that stays for a quarter second."""
+    rate = float(p[P_GAP_RATE])
+    return min(2.0 * UNSEEN_TIME * rate * rate * dt, pi * pi)
+
+
 # fmt: off
 @kernel
 def bridge_gap(
@@ -343,8 +352,7 @@ def step(
             return
     q_theta = p[P_GYR_NOISE] * p[P_GYR_NOISE] * dt
     if (int(x[STATUS]) & (s.SATURATED | s.GYR_STUCK)) != 0:
-        unknown = p[P_GAP_RATE] * dt
-        q_theta += min(unknown * unknown, pi * pi)
+        q_theta += unseen(p, dt)
     transition(w, rx, ry, rz, dt)
     predict(P, w, q_theta, p[P_BIAS_NOISE] * p[P_BIAS_NOISE] * dt)
     if (int(x[STATUS]) & s.GAP) != 0:

@@ -156,20 +156,47 @@ def test_input_is_left_as_it_was():
         assert np.array_equal(part, copy)
 
 
-def test_samples_that_are_missing_are_refused_with_place_and_way_out():
+@pytest.mark.parametrize("samples_per_step", [1, 2])
+def test_samples_with_nan_are_left_out_and_flagged(samples_per_step):
     t, gyr, acc = samples(0.05)
-    broken = acc.copy()
-    broken[700] = np.nan
-    with pytest.raises(ValueError, match=r"`acc` must be finite .* at 35 s; leave such rows out"):
-        mechanise((t, gyr, broken), START)
-    keep = np.arange(len(t)) != 700
-    mechanise((t[keep], gyr[keep], acc[keep]), START)  # as the message says
+    rough_gyr, rough_acc = gyr.copy(), acc.copy()
+    rough_acc[[0, 700]], rough_gyr[[300, 301, 1200], 1] = np.nan, np.nan
+    keep = ~np.isin(np.arange(len(t)), [0, 300, 301, 700, 1200])
+    sol = mechanise((t, rough_gyr, rough_acc), START, samples=samples_per_step)
+    same = mechanise((t[keep], gyr[keep], acc[keep]), START, samples=samples_per_step)
+    for name in ("t", "lla", "v_n", "q_nb"):
+        assert np.array_equal(getattr(sol, name), getattr(same, name))
+    assert not same.status.any()
+    # the last sample is NaN: only a step that still waits for its second one can say so
+    assert sol.status_counts() == {"GYR_INVALID": samples_per_step, "ACC_INVALID": 1}
+    flagged = sol.t[sol.status > 0][:2]
+    assert flagged == pytest.approx([15.1, 35.05], abs=0.051 * (samples_per_step - 1) + 1e-9)
+
+
+def test_flags_wait_for_the_next_piece():
+    t, gyr, acc = samples(0.05)
+    acc = acc.copy()
+    acc[99:101] = np.nan
+    ins = Mechanisation(samples=2)
+    first = ins.init(replace(START, t=0.0))
+    whole, _ = ins.advance(first, (t[1:], gyr[1:], acc[1:]))
+    one, state = ins.advance(first, (t[1:100], gyr[1:100], acc[1:100]))
+    two, _ = ins.advance(state, (t[100:], gyr[100:], acc[100:]))
+    assert np.array_equal(np.concatenate((one.status, two.status)), whole.status)
+    assert whole.status_counts() == {"ACC_INVALID": 1}
+    with pytest.raises(ValueError, match=r"must begin after the state, got 0\.05 after 4\.9"):
+        ins.advance(state, (t[1:], gyr[1:], acc[1:]))
+
+
+def test_a_gap_is_refused_with_place_and_way_out():
+    t, gyr, acc = samples(0.05)
     keep = (t < 20.0) | (t > 23.0)
-    with pytest.raises(
-        DataGap, match=r"no samples for 3.1 s before 23.05 s, longer than `max_gap`"
-    ):
+    with pytest.raises(DataGap, match=r"no valid samples for 3.1 s before 23.05 s, longer than"):
         mechanise((t[keep], gyr[keep], acc[keep]), START)
     mechanise((t[keep], gyr[keep], acc[keep]), START, max_gap=5.0)
+    acc = np.where(keep[:, None], acc, np.nan)
+    with pytest.raises(DataGap, match=r"no valid samples for 3.1 s"):
+        mechanise((t, gyr, acc), START)
 
 
 def test_what_holds_no_samples_is_refused():
@@ -177,7 +204,7 @@ def test_what_holds_no_samples_is_refused():
         mechanise([1, 2, 3], START)
     with pytest.raises(MissingStream, match="imu"):
         mechanise(Recording(mag=Mag(t=[0.0], mag=[[1e-5, 0, 0]])), START)
-    with pytest.raises(InputError, match="must hold inertial samples"):
+    with pytest.raises(InputError, match="must hold valid inertial samples"):
         mechanise(([], np.empty((0, 3)), np.empty((0, 3))), START)
     with pytest.raises(ValueError, match="equal length, got 1 and 2 and 2"):
         mechanise(([0.0], np.zeros((2, 3)), np.zeros((2, 3))), START)

@@ -16,7 +16,7 @@ from strapdown.navigation.mechanisation.earth_model import SphericalEarth
 from strapdown.navigation.mechanisation.inputs import (
     Samples,
     Start,
-    require_finite,
+    Valid,
     samples_after,
     samples_of,
 )
@@ -42,9 +42,12 @@ class MechanisationState(NamedTuple):
     ----------
     x : ndarray
         Its memory; `strapdown.kernels.mechanisation.layout` names the cells.
+    flags : int
+        `Status` bits that the next row takes.
     """
 
     x: FloatArray
+    flags: int = 0
 
     @property
     def t(self) -> float:
@@ -91,7 +94,8 @@ class Mechanisation:
 
     Notes
     -----
-    Online but for points. For a motion with smooth rates the error falls with the fourth power
+    Online but for points. A sample with NaN is left out, and the next one covers its time; its row
+    is flagged. For a motion with smooth rates the error falls with the fourth power
     of the step from two samples on, with the third for one, with the second without
     compensation; the slow terms of the frame's own turn are of second order and make micrometres
     at 100 Hz. Sub-samples are taken as equally long. Where the accelerometer is slower than the
@@ -230,7 +234,7 @@ class Mechanisation:
         Raises
         ------
         ValueError
-            If a sample is not finite, or samples begin before the state.
+            If samples begin before the state.
         DataGap
             If an interval is longer than `max_gap`.
         ComputationError
@@ -241,10 +245,14 @@ class Mechanisation:
                 "`sampling` must be 'mean' to go piece by piece: points are joined by a spline "
                 "over the whole recording; use `run`."
             )
-        t, gyr, acc = samples_of(rec)
+        samples = samples_of(rec)
+        if len(samples.t) and not samples.t[0] > state.t:
+            raise ValueError(
+                f"`rec` must begin after the state, got {samples.t[0]:g} after {state.t:g}."
+            )
         x = state.x.copy()
-        out = self._integrate(x, self._p, *samples_after(t, gyr, acc, state.t, self.max_gap))
-        return self._solution(out), MechanisationState(x)
+        out, flags = self._integrate(x, samples_after(samples, state.t, self.max_gap), state.flags)
+        return self._solution(out), MechanisationState(x, flags)
 
     def run(self, rec: Samples, start: Start) -> Solution:
         """Return the solution over a whole recording, the start as its first row.
@@ -260,9 +268,10 @@ class Mechanisation:
         -------
         Solution
         """
-        t, gyr, acc = samples_of(rec)
+        samples = samples_of(rec)
+        t = samples.t
         if len(t) == 0:
-            raise InputError("`rec` must hold inertial samples, it has none.")
+            raise InputError("`rec` must hold valid inertial samples, it has none.")
         first = float(t[0]) if start.t is None else start.t
         if not t[0] <= first <= t[-1]:
             raise ValueError(
@@ -270,23 +279,26 @@ class Mechanisation:
                 f"got {first:g}."
             )
         if self.sampling == "points" and len(t) > 1:
-            require_finite(t, gyr, acc)
-            gyr = increments.means_from_points(t, gyr)
-            acc = increments.means_from_points(t, acc)
+            samples = samples._replace(
+                gyr=increments.means_from_points(t, samples.gyr),
+                acc=increments.means_from_points(t, samples.acc),
+            )
         x = self.init(Start(lla=start.lla, q_nb=start.q_nb, v_n=start.v_n, t=first)).x
         at = int(np.searchsorted(t, first))
         if self._p[k.FIRST] > 0.0 and t[at] == first:
             # the sample that ends at the start is the one before the first
-            x[k.TH : k.TH + 3], x[k.DV : k.DV + 3], x[k.BEFORE] = gyr[at], acc[at], 1.0
-        t, gyr, acc = samples_after(t, gyr, acc, first, self.max_gap)
-        rows = [_row(x, self._p)]
-        rows.append(self._integrate(x, self._p, t, gyr, acc))
+            x[k.TH : k.TH + 3], x[k.DV : k.DV + 3] = samples.gyr[at], samples.acc[at]
+            x[k.BEFORE] = 1.0
+        rows = [_row(x, self._p, 0)]
+        out, flags = self._integrate(x, samples_after(samples, first, self.max_gap), 0)
+        rows.append(out)
         left = int(x[k.COUNT] - self._p[k.FIRST])
         if left:  # the last step is of as many samples as there are
-            rows.append(self._finish(x, left))
+            self._finish(x, left)
+            rows.append(_row(x, self._p, flags))
         return self._solution(np.concatenate(rows))
 
-    def _finish(self, x: FloatArray, left: int) -> FloatArray:
+    def _finish(self, x: FloatArray, left: int) -> None:
         from strapdown.kernels.mechanisation.run import step
 
         p = self._p.copy()
@@ -294,21 +306,24 @@ class Mechanisation:
         increments.fill(p, left, compensate=self.compensate and left > 1)
         step(x, p, np.zeros(k.W_SIZE))
         self._refuse(x)
-        return _row(x, p)
 
-    def _integrate(
-        self, x: FloatArray, p: FloatArray, t: FloatArray, gyr: FloatArray, acc: FloatArray
-    ) -> FloatArray:
-        """Advance `x` and return time and the ten outputs of each step."""
+    def _integrate(self, x: FloatArray, samples: Valid, flags: int) -> tuple[FloatArray, int]:
+        """Advance `x`; return time, ten outputs and status of each step, and the flags left."""
         from strapdown.kernels.mechanisation.run import run
 
+        m, p = self.samples, self._p
         waiting = int(x[k.COUNT] - p[k.FIRST])
-        steps = (waiting + len(t)) // self.samples
-        out = np.empty((steps, 10))
-        run(x, p, np.zeros(k.W_SIZE), t, gyr, acc, out)
+        steps = (waiting + len(samples.t)) // m
+        out = np.empty((steps, 12))
+        outputs = np.empty((steps, 10))
+        run(x, p, np.zeros(k.W_SIZE), samples.t, samples.gyr, samples.acc, outputs)
         self._refuse(x)
-        ends = t[self.samples - 1 - waiting :: self.samples][:steps]
-        return np.concatenate((ends[:, np.newaxis], out), axis=1)
+        out[:, 0] = samples.t[m - 1 - waiting :: m][:steps]
+        out[:, 1:11] = outputs
+        bits = np.concatenate((np.zeros(waiting, dtype=np.int64), samples.flags))
+        bits[0] |= flags
+        out[:, 11] = np.bitwise_or.reduce(bits[: steps * m].reshape(steps, m), axis=1)
+        return out, int(np.bitwise_or.reduce(bits[steps * m :]))
 
     def _refuse(self, x: FloatArray) -> None:
         if x[k.STATUS] == k.POLE:
@@ -328,7 +343,7 @@ class Mechanisation:
             lla=rows[:, 1:4],
             v_n=rows[:, 4:7],
             q_nb=rows[:, 7:11],
-            status=np.zeros(len(rows), dtype=np.int64),
+            status=rows[:, 11].astype(np.int64),
             filter=f"mechanisation-{self.frame}",
             causal=self.sampling == "mean",
             heading_reference=self.heading_reference,
@@ -362,7 +377,7 @@ def mechanise(
     ----------
     rec : Recording, Imu, or tuple of three arrays
         Inertial samples; as a tuple ``(t, gyr, acc)`` of shapes (n,), (n, 3), (n, 3) in s,
-        rad/s, m/s^2. Row k covers the interval that ends at ``t[k]``.
+        rad/s, m/s^2. Row k covers the interval that ends at ``t[k]``; NaN rows are left out.
     start : Start
         Attitude, velocity, position and their time.
     frame, attitude, earth, gravity, samples, compensate, height, sampling, max_gap
@@ -378,7 +393,7 @@ def mechanise(
     Raises
     ------
     ValueError
-        If the start lies outside the samples, or a sample is not finite.
+        If the start lies outside the samples.
     DataGap
         If an interval is longer than `max_gap`.
     ComputationError
@@ -416,10 +431,10 @@ def _lock_text(frame: str) -> str:
     return f"gimbal lock (the body's x axis within 0.06 deg of {axis})"
 
 
-def _row(x: FloatArray, p: FloatArray) -> FloatArray:
-    """Return time and the ten outputs of a state."""
+def _row(x: FloatArray, p: FloatArray, flags: int) -> FloatArray:
+    """Return time, the ten outputs and the status of a state."""
     from strapdown.kernels.mechanisation.run import tell
 
     w = np.zeros(k.W_SIZE)
     tell(x, p, w)
-    return np.concatenate((x[k.T : k.T + 1], w[k.OUT : k.OUT + 10]))[np.newaxis]
+    return np.concatenate((x[k.T : k.T + 1], w[k.OUT : k.OUT + 10], [flags]))[np.newaxis]

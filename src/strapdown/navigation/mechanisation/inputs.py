@@ -2,13 +2,15 @@
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from strapdown import _checks
-from strapdown._types import FloatArray
+from strapdown._types import FloatArray, IntArray
 from strapdown.errors import DataGap
+from strapdown.kernels.status import ACC_INVALID, GYR_INVALID
 from strapdown.recording import Imu, Recording
 from strapdown.solution import Solution
 from strapdown.truth import Truth
@@ -73,49 +75,59 @@ class Start:
         return cls(t=float(sol.t[row]), lla=sol.lla[row], v_n=sol.v_n[row], q_nb=sol.q_nb[row])
 
 
-def samples_of(rec: Samples) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return time, rates and specific forces of whatever holds them."""
+class Valid(NamedTuple):
+    """Samples without NaN.
+
+    Attributes
+    ----------
+    t, gyr, acc : ndarray, shapes (n,), (n, 3), (n, 3)
+        Times [s], rates [rad/s], specific forces [m/s^2].
+    flags : ndarray of int, shape (n + 1,)
+        `Status` bits of what was left out before each sample, and after the last.
+    """
+
+    t: FloatArray
+    gyr: FloatArray
+    acc: FloatArray
+    flags: IntArray
+
+
+def samples_of(rec: Samples) -> Valid:
+    """Return the samples of whatever holds them, those with NaN left out."""
     if isinstance(rec, Recording):
         rec = rec.need("imu")
     if isinstance(rec, Imu):
-        return rec.t, rec.gyr, rec.acc
-    if not isinstance(rec, tuple) or len(rec) != 3:
+        t, gyr, acc = rec.t, rec.gyr, rec.acc
+    elif isinstance(rec, tuple) and len(rec) == 3:
+        gyr = _checks.as_samples("gyr", rec[1], allow_nan=True)
+        acc = _checks.as_samples("acc", rec[2], allow_nan=True)
+        t = _checks.as_times("t", rec[0])
+        _checks.same_length(t=t, gyr=gyr, acc=acc)
+    else:
         raise TypeError(
             "`rec` must be a Recording, an Imu or a tuple (t, gyr, acc), "
             f"got {type(rec).__name__}."
         )
-    gyr = _checks.as_samples("gyr", rec[1], allow_nan=True)
-    acc = _checks.as_samples("acc", rec[2], allow_nan=True)
-    t = _checks.as_times("t", rec[0])
-    _checks.same_length(t=t, gyr=gyr, acc=acc)
-    return t, gyr, acc
+    bits: IntArray = np.where(np.isnan(gyr).any(axis=1), GYR_INVALID, 0)
+    bits |= np.where(np.isnan(acc).any(axis=1), ACC_INVALID, 0)
+    good = bits == 0
+    flags = np.zeros(int(good.sum()) + 1, dtype=np.int64)
+    np.bitwise_or.at(flags, np.cumsum(good)[~good], bits[~good])  # the next good one takes them
+    t, gyr, acc = (np.ascontiguousarray(part[good]) for part in (t, gyr, acc))
+    return Valid(t, gyr, acc, flags)
 
 
-def samples_after(
-    t: FloatArray, gyr: FloatArray, acc: FloatArray, start: float, max_gap: float
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return the samples after a time, all of them fit for integration."""
-    first = int(np.searchsorted(t, start, side="right"))
-    t, gyr, acc = (np.ascontiguousarray(part[first:]) for part in (t, gyr, acc))
-    require_finite(t, gyr, acc)
-    steps = np.diff(t, prepend=start)
-    if len(t) and steps.max() > max_gap:
+def samples_after(samples: Valid, start: float, max_gap: float) -> Valid:
+    """Return the samples after a time; refuse a gap among them."""
+    first = int(np.searchsorted(samples.t, start, side="right"))
+    t, gyr, acc, flags = samples
+    left = Valid(t[first:], gyr[first:], acc[first:], flags[first:])
+    steps = np.diff(left.t, prepend=start)
+    if len(left.t) and steps.max() > max_gap:
         row = int(np.argmax(steps > max_gap))
         raise DataGap(
-            f"stream imu has no samples for {steps[row]:.3g} s before {t[row]:g} s, longer than "
-            f"`max_gap` of {max_gap:g} s; begin again after the gap, or raise `max_gap` to take "
-            "the motion in it as uniform."
+            f"stream imu has no valid samples for {steps[row]:.3g} s before {left.t[row]:g} s, "
+            f"longer than `max_gap` of {max_gap:g} s; begin again after the gap, or raise "
+            "`max_gap` to take the motion in it as uniform."
         )
-    return t, gyr, acc
-
-
-def require_finite(t: FloatArray, gyr: FloatArray, acc: FloatArray) -> None:
-    """Refuse a sample that is not finite, with its time."""
-    for name, samples in (("gyr", gyr), ("acc", acc)):
-        bad = ~np.isfinite(samples).all(axis=1)
-        if bad.any():
-            row = int(np.argmax(bad))
-            raise ValueError(
-                f"`{name}` must be finite for dead reckoning, got {samples[row]} at {t[row]:g} s; "
-                "leave such rows out: the next sample then covers their time."
-            )
+    return left

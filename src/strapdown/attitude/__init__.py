@@ -3,6 +3,7 @@
 from typing import Any
 
 from strapdown import estimator as _estimator
+from strapdown.attitude.adaptive_ekf import AdaptiveEkf
 from strapdown.attitude.determination import (
     Determination,
     Observability,
@@ -26,6 +27,7 @@ from strapdown.attitude.robust_eskf import RobustEskf
 from strapdown.attitude.two_stage import TwoStage
 
 __all__ = [
+    "AdaptiveEkf",
     "Determination",
     "GyroIntegration",
     "IndirectEkf",

@@ -2,6 +2,7 @@
 
 from strapdown.navigation import alignment, error_growth, grades
 from strapdown.navigation.dead_reckoning import DeadReckoning
+from strapdown.navigation.gnssins import Gnssins
 from strapdown.navigation.loosely_coupled import LooselyCoupled
 from strapdown.navigation.mechanisation import (
     Mechanisation,
@@ -14,6 +15,7 @@ from strapdown.navigation.tracker import NavigationTracker
 
 __all__ = [
     "DeadReckoning",
+    "Gnssins",
     "LooselyCoupled",
     "Mechanisation",
     "NavigationTracker",

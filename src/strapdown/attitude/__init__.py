@@ -23,6 +23,7 @@ from strapdown.attitude.integration import GyroIntegration
 from strapdown.attitude.madgwick import Madgwick
 from strapdown.attitude.mahony import Mahony
 from strapdown.attitude.mekf import Mekf
+from strapdown.attitude.quest_ekf import QuestEkf
 from strapdown.attitude.robust_eskf import RobustEskf
 from strapdown.attitude.two_stage import TwoStage
 
@@ -35,6 +36,7 @@ __all__ = [
     "Mahony",
     "Mekf",
     "Observability",
+    "QuestEkf",
     "RobustEskf",
     "TwoStage",
     "compass",

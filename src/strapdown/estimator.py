@@ -76,6 +76,8 @@ class Estimator:
         "acc": ("x", "y", "z"),
         "mag": ("x", "y", "z"),
     }
+    # Where the innovations, sigmas and outcome of each sensor stand in a row of the diagnostics.
+    DIAGNOSED: ClassVar[Mapping[str, int]] = {"acc": _m.D_ACC, "mag": _m.D_MAG}
     FROM_SENSOR: ClassVar[tuple[Taken, ...]] = ()
 
     @classmethod
@@ -189,14 +191,15 @@ class Estimator:
         gyr, acc = real_samples(imu)
         last = max(CELLS[name] + len(COLUMNS[name]) for name in self.OUTPUTS)
         out = np.empty((len(imu), last - _m.STATUS))
-        diag = np.empty((len(imu), _m.W_HEAD)) if diagnostics else _NO_DIAGNOSTICS
+        width = max(self.DIAGNOSED.values()) + 7
+        diag = np.empty((len(imu), width)) if diagnostics else _NO_DIAGNOSTICS
         kernel = self._kernel()
         events = self._events(rec)
         kernel.run(
             x, P, self._params(), np.zeros(kernel.W_SIZE),
             imu.t, gyr, acc, t_mag, field, events, out, diag,
         )  # fmt: skip
-        rows = _diagnostics(imu.t, diag, self.LABELS) if diagnostics else {}
+        rows = _diagnostics(imu.t, diag, self.DIAGNOSED, self.LABELS) if diagnostics else {}
         return self._solution(rec, imu.t, out, rows), State(self.NAME, x, P)
 
     def run(self, rec: Recording, *, diagnostics: bool = True) -> Solution:
@@ -402,11 +405,14 @@ _INBOX: Mapping[str, tuple[int, int]] = {
 
 
 def _diagnostics(
-    t: FloatArray, diag: FloatArray, labels: Mapping[str, tuple[str, ...]]
+    t: FloatArray,
+    diag: FloatArray,
+    cells: Mapping[str, int],
+    labels: Mapping[str, tuple[str, ...]],
 ) -> dict[str, Diagnostics]:
     """Return the rows at which there was a measurement, by sensor."""
     found = {}
-    for name, cell in (("acc", _m.D_ACC), ("mag", _m.D_MAG)):
+    for name, cell in cells.items():
         outcome: IntArray = diag[:, cell + 6].astype(np.int64)
         rows = np.flatnonzero(outcome != _s.NOT_MEASURED)
         if len(rows):

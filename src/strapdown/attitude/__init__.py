@@ -23,8 +23,10 @@ from strapdown.attitude.integration import GyroIntegration
 from strapdown.attitude.madgwick import Madgwick
 from strapdown.attitude.mahony import Mahony
 from strapdown.attitude.mekf import Mekf
+from strapdown.attitude.multi_mode_ahrs import MultiModeAhrs
 from strapdown.attitude.quest_ekf import QuestEkf
 from strapdown.attitude.robust_eskf import RobustEskf
+from strapdown.attitude.standard_ahrs import StandardAhrs
 from strapdown.attitude.two_stage import TwoStage
 
 __all__ = [
@@ -35,9 +37,11 @@ __all__ = [
     "Madgwick",
     "Mahony",
     "Mekf",
+    "MultiModeAhrs",
     "Observability",
     "QuestEkf",
     "RobustEskf",
+    "StandardAhrs",
     "TwoStage",
     "compass",
     "create",

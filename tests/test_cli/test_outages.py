@@ -47,6 +47,7 @@ def test_the_json_has_a_row_per_window_and_per_length(command, data_dir):
         (("--outage", "360:300"), "--outage must end after it starts, got '360:300'"),
         (("--outage", "1:2"), "must have the stream .gnss."),
         (("--export", "kml,shp"), "--export must be of kml, gpx, geojson, csv, tum, got 'shp'"),
+        (("--tiles", "nowhere"), "nowhere: there is no such file or folder"),
         (("--export", "kml"), "--export kml needs positions, and robust-eskf gives attitude"),
     ],
 )

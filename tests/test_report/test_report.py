@@ -310,6 +310,71 @@ def test_withheld_fixes_are_drawn_apart_and_their_errors_listed(drive, tmp_path)
     assert any("lever arm [m]" in json.dumps(f) for f in reader.figures)
 
 
+def test_a_reference_that_does_not_count_is_not_on_the_map(drive, tmp_path):
+    sol, rec = drive
+    lla = rec.reference.position.lla.copy()
+    lla[3000:3100, 0] += 4e-4  # 2.5 km off
+    position = replace(rec.reference.position, lla=lla, valid=np.abs(np.arange(6000) - 3050) > 50)
+    rec = replace(rec, reference=replace(rec.reference, position=position))
+    reader = Reader(report.write(sol, rec, tmp_path / "r.html").read_text("utf-8"))
+    track = next(f for f in reader.figures if "east [m]" in json.dumps(f))
+    truth = next(d for d in track["data"] if d["name"] == "reference")
+    north = unpack(truth["y"])
+    assert np.nanmax(np.abs(north)) < 200.0  # the swing of 100 m, and where it begins
+    assert np.isnan(north).sum() == 1  # the pen is lifted there
+
+
+def test_the_gate_is_drawn_where_the_estimator_has_one(run, tmp_path):
+    sol, rec = run(2000)
+    gated = replace(sol, meta={"parameters": {"gate": 4.5}})
+    for solution, count in ((gated, 6), (sol, 0)):  # two lines in each of three panels
+        reader = Reader(report.write(solution, rec, tmp_path / "r.html").read_text("utf-8"))
+        drawn = [d for f in reader.figures for d in f["data"] if d.get("name") == "gate"]
+        assert len(drawn) == count
+        assert ("4.5 sigma" in reader.words) == bool(count)
+    assert count == 0
+    reader = Reader(report.write(gated, rec, tmp_path / "r.html").read_text("utf-8"))
+    drawn = [d for f in reader.figures for d in f["data"] if d.get("name") == "gate"]
+    assert sorted({float(v) for d in drawn for v in unpack(d["y"])}) == [-4.5, 4.5]
+
+
+def test_the_first_wide_sigma_does_not_flatten_what_follows(run, tmp_path):
+    sol, rec = run(4000)
+    d = sol.diagnostics["acc"]
+    sigma, innovation = d.sigma.copy(), d.innovation.copy()
+    sigma[:5], innovation[7] = 1e3, 2.4e3  # a start, and a jump that the gate refuses
+    outcome = np.ones(len(d.t), int)
+    outcome[7] = 2
+    d = replace(d, sigma=sigma, innovation=innovation, outcome=outcome)
+    std = sol.std_gyr_bias.copy()
+    std[:300] = 1.0
+    sol = replace(sol, diagnostics={"acc": d}, std_gyr_bias=std)
+    reader = Reader(report.write(sol, rec, tmp_path / "r.html").read_text("utf-8"))
+    shown = [
+        f["layout"]["yaxis"]["range"] for f in reader.figures
+        if any(t.get("name") == "±3 sigma" for t in f["data"]) and "range" in f["layout"]["yaxis"]
+    ]  # fmt: skip
+    bias, innovations = (high for _, high in shown)
+    assert 3.0 < innovations < 5.0  # the largest of 950 of sigma one
+    # 0.001 rad/s and three times 5e-4, in deg/s
+    assert bias == pytest.approx(np.degrees(0.0025), rel=1e-3)
+
+
+def test_a_mount_is_shown_from_where_it_was_found(drive, tmp_path):
+    sol, rec = drive
+    q_vb = sol.q_vb.copy()
+    q_vb[:2000] = (1.0, 0.0, 0.0, 0.0)
+    found = replace(sol, q_vb=q_vb)
+    reader = Reader(report.write(found, rec, tmp_path / "r.html").read_text("utf-8"))
+    figure = next(f for f in reader.figures if "angle [°]" in json.dumps(f, ensure_ascii=False))
+    assert unpack(figure["data"][0]["x"])[0] == np.float32(sol.t[2000])
+    assert figure["layout"]["xaxis"]["range"] == [sol.t[0], sol.t[-1]]
+    assert "They differ by 0.00°" in reader.words
+    never = replace(sol, q_vb=np.tile((1.0, 0.0, 0.0, 0.0), (len(sol), 1)))
+    reader = Reader(report.write(never, rec, tmp_path / "r.html").read_text("utf-8"))
+    assert "The mount was not found" in reader.words
+
+
 # --- the file ---------------------------------------------------------------------------
 
 

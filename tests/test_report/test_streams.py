@@ -48,8 +48,12 @@ def test_every_flag_has_its_meaning():
 def test_innovations_can_be_seen_beside_a_sigma_that_dwarfs_them(run):
     sol, _ = run(1000)
     d = sol.diagnostics["acc"]
-    assert health._innovation_limits(d, 0) is None
-    low, high = health._innovation_limits(replace(d, sigma=1e4 * d.sigma), 0)
-    largest = np.abs(d.innovation[:, 0]).max()
-    assert (low, high) == pytest.approx((-1.2 * largest, 1.2 * largest), rel=1e-12)
-    assert health._innovation_limits(replace(d, sigma=np.nan * d.sigma), 0) is None
+    used = np.abs(d.innovation[d.outcome == 1, 0]).max()
+    for sigma, gate, limit in (
+        (1.0, None, max(3.0, used)),
+        (1.0, 5.5, 5.5),
+        (1e4, None, used),
+        (np.nan, None, used),
+    ):
+        low, high = health._innovation_limits(replace(d, sigma=sigma * d.sigma), 0, gate)
+        assert (low, high) == pytest.approx((-1.1 * limit, 1.1 * limit), rel=1e-12)

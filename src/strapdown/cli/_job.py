@@ -13,6 +13,7 @@ from strapdown.errors import DataGap, InputError
 if TYPE_CHECKING:
     from strapdown.evaluation import AttitudeErrors, NavigationErrors, Window
     from strapdown.recording import Recording
+    from strapdown.report import Tiles
     from strapdown.solution import Solution
 
 EXPORTS: Final = ("kml", "gpx", "geojson", "csv", "tum")
@@ -42,6 +43,8 @@ class Job:
         Of `EXPORTS`: more files of the solution or its track.
     report : bool
         Whether to write ``report.html``.
+    tiles : Tiles, optional
+        Map to lie below the track in the report.
     json : bool
         Whether to print the summary as JSON instead of a table.
     """
@@ -55,6 +58,7 @@ class Job:
     outages: Sequence[tuple[float, float]] = ()
     exports: Sequence[str] = ()
     report: bool = True
+    tiles: "Tiles | None" = None
     json: bool = False
 
 
@@ -119,7 +123,9 @@ def _results(
 
         progress.step("writing the report")
         files["report"] = "report.html"
-        report.write(sol, rec, aside / files["report"], errors, outages=outages)
+        report.write(
+            sol, rec, aside / files["report"], errors, outages=outages, tiles=job.tiles
+        )
     timing["report_s"] = time.perf_counter() - begun
     return {
         _output.MARK: f"strapdown {__version__}",

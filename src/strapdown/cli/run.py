@@ -1,11 +1,15 @@
 """``strapdown run``: the main job."""
 
-from typing import Annotated
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from strapdown.cli import _job, _options, _output
 from strapdown.errors import InputError
+
+if TYPE_CHECKING:
+    from strapdown.report import Tiles
 
 
 @_options.reads_log
@@ -26,6 +30,14 @@ def run(
         str | None,
         typer.Option("--export", metavar="kml,gpx,geojson,csv,tum", help="More files to write."),
     ] = None,
+    tiles: Annotated[
+        Path | None,
+        typer.Option(
+            "--tiles",
+            metavar="PATH",
+            help="Map below the track in the report: an MBTiles file or a folder of z/x/y.png.",
+        ),
+    ] = None,
     folder: _options.Folder = None,
     json: _options.Json = False,
     no_report: _options.NoReport = False,
@@ -45,9 +57,16 @@ def run(
         exports=_kinds(export),
         folder=folder or _output.default_folder(source.main),
         report=not no_report,
+        tiles=None if tiles is None else _tiles(tiles),
         json=json,
     )
     _job.do(job, str(source.main), source.read)
+
+
+def _tiles(path: Path) -> "Tiles":
+    from strapdown.report import Tiles
+
+    return Tiles(path)
 
 
 def _span(text: str) -> tuple[float, float]:

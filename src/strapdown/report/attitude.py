@@ -74,7 +74,8 @@ def scene_section(
         interval = float(np.median(np.diff(turned.t))) if len(turned.t) > 1 else 0.0
         found = match(turned.t, sol.t[rows], max_gap=max(MAX_GAP_S, 2.0 * interval))
         ghost = np.full((len(rows), 4), np.nan)
-        ghost[found.rows] = found.quats(turned.q_nb)
+        counts = found.both(turned.valid)
+        ghost[found.rows[counts]] = found.quats(turned.q_nb)[counts]
     view = scene(sol.t[rows], sol.q_nb[rows], aligned(sol)[rows], ghost)
     return Section(title="3D view", blocks=[view])
 

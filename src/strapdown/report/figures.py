@@ -76,6 +76,17 @@ class Band:
     color: str = MUTED
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Picture:
+    """A picture below all lines: a ``data:`` URL, its west and north edge and its size."""
+
+    url: str
+    left: float
+    top: float
+    width: float
+    height: float
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Panel:
     """One pair of axes.
@@ -99,7 +110,9 @@ class Panel:
     y_ticks : mapping of float to str, optional
         Names at heights, instead of numbers.
     equal : bool
-        Whether both axes have one scale, as a map needs.
+        Whether both axes have one scale, as a map needs; its numbers then have no powers of ten.
+    pictures : sequence of Picture
+        Below all items; in a grid figure only.
     """
 
     y_label: str
@@ -113,6 +126,7 @@ class Panel:
     y_range: tuple[float, float] | None = None
     y_ticks: dict[float, str] | None = None
     equal: bool = False
+    pictures: Sequence[Picture] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -218,6 +232,7 @@ def grid_figure(
     inner = sum(heights) + between * (len(rows) - 1)
     layout = _layout(inner)
     layout["hovermode"] = "closest"
+    layout["images"] = []
     data: list[dict[str, Any]] = []
     gap = 0.09 if columns > 1 else 0.0
     width = (1.0 - gap * (columns - 1)) / columns
@@ -239,6 +254,8 @@ def grid_figure(
             if panel.equal:
                 y_axis |= {"scaleanchor": x_name, "scaleratio": 1}
                 x_axis["constrain"] = y_axis["constrain"] = "range"
+                x_axis["exponentformat"] = y_axis["exponentformat"] = "none"
+            layout["images"] += [_picture(p, x_name, y_name) for p in panel.pictures]
             layout["xaxis" + _suffix(number)] = x_axis
             layout["yaxis" + _suffix(number)] = y_axis
             if panel.title:
@@ -407,6 +424,14 @@ def _y_title(label: str, left: float, domain: list[float]) -> dict[str, Any]:
         "text": label, "showarrow": False, "textangle": -90, "x": left, "xref": "paper",
         "xanchor": "center", "xshift": -58, "y": 0.5 * (domain[0] + domain[1]), "yref": "paper",
         "yanchor": "middle",
+    }  # fmt: skip
+
+
+def _picture(picture: Picture, x_name: str, y_name: str) -> dict[str, Any]:
+    return {
+        "source": picture.url, "xref": x_name, "yref": y_name, "x": picture.left,
+        "y": picture.top, "sizex": picture.width, "sizey": picture.height, "sizing": "stretch",
+        "layer": "below",
     }  # fmt: skip
 
 

@@ -1,5 +1,6 @@
 """What an estimator says of itself: biases, status, innovations, as sections of a report."""
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -21,7 +22,7 @@ from strapdown.report.page import Block, Section, plot, table, text
 from strapdown.solution import Diagnostics, Outcome, Solution, Status
 from strapdown.units import DPS
 
-DWARFED = 10.0  # 3 sigma over the largest innovation, from which on both cannot be seen
+DWARFED = 10.0  # one over the other, from which on both cannot be seen in one panel
 
 
 class Flag(NamedTuple):
@@ -67,7 +68,9 @@ def bias_section(sol: Solution) -> Section:
             if std is not None:
                 items.append(sigma_band(sol.t, std[:, i] / unit, values[:, i] / unit))
             items.append(Series(x=sol.t, y=values[:, i] / unit, name=axis, color=AXIS_COLORS[i]))
-            panels.append(Panel(y_label=f"{axis} [{symbol}]", items=items, height=100))
+            limits = _settled(values[:, i] / unit, None if std is None else std[:, i] / unit)
+            label = f"{axis} [{symbol}]"
+            panels.append(Panel(y_label=label, items=items, height=100, y_range=limits))
         blocks.append(plot(time_figure(panels), f"Estimated {name}."))
     return Section(title="Biases", blocks=blocks)
 
@@ -131,17 +134,28 @@ def skipped_blocks(sol: Solution) -> list[Block]:
 def innovation_section(sol: Solution) -> Section:
     """Return measured less predicted of each aiding sensor, with 3 sigma and rejections."""
     blocks: list[Block] = []
+    gate = _gate(sol)
     if sol.diagnostics:
         blocks.append(_innovation_table(sol))
     for name, d in sol.diagnostics.items():
         if len(d.t):
-            blocks.append(plot(time_figure(_innovation_panels(d)), f"Innovations of {name}."))
+            panels = _innovation_panels(d, gate)
+            blocks.append(plot(time_figure(panels), f"Innovations of {name}."))
+    gated = (
+        "" if gate is None else f" Dotted is the gate, {gate:g} sigma of all components together."
+    )
     return Section(
         title="Innovations",
-        intro="Measured less predicted, one row for each measurement that was looked at. Where "
-        "3 sigma is far beyond all innovations it fills the panel.",
+        intro="Measured less predicted, one row for each measurement that was looked at. What is "
+        f"far beyond the others lies beyond the panel; drag an axis to see it.{gated}",
         blocks=blocks,
     )
+
+
+def _gate(sol: Solution) -> float | None:
+    """Return the gate of the estimator in sigmas, None where it has none."""
+    gate = dict(sol.meta.get("parameters", {})).get("gate")
+    return float(gate) if isinstance(gate, (int, float)) and 0.0 < gate < math.inf else None
 
 
 def _innovation_table(sol: Solution) -> Block:
@@ -168,7 +182,7 @@ def _innovation_table(sol: Solution) -> Block:
     return table(heads, rows)
 
 
-def _innovation_panels(d: Diagnostics) -> list[Panel]:
+def _innovation_panels(d: Diagnostics, gate: float | None) -> list[Panel]:
     accepted = d.outcome == Outcome.ACCEPTED
     refused = d.outcome > Outcome.ACCEPTED
     panels = []
@@ -176,27 +190,48 @@ def _innovation_panels(d: Diagnostics) -> list[Panel]:
         items: list[Series | Band] = []
         if np.isfinite(d.sigma[:, i]).any():
             items.append(sigma_band(d.t, d.sigma[:, i]))
+            if gate is not None:
+                items += [
+                    Series(x=d.t, y=side * d.sigma[:, i], name="gate", color=ALARM, width=0.7,
+                           dash="dot")
+                    for side in (gate, -gate)
+                ]  # fmt: skip
         x, y = d.t[accepted], d.innovation[accepted, i]
         items.append(Series(x=x, y=y, name="accepted", color=MUTED, width=0.9))
         if refused.any():
             x, y = d.t[refused], d.innovation[refused, i]
             items.append(Series(x=x, y=y, name="rejected", color=ALARM, kind="points", width=3.5))
         unit = f" [{d.unit}]" if d.unit else ""
-        limits = _innovation_limits(d, i)
+        limits = _innovation_limits(d, i, gate)
         panels.append(Panel(y_label=f"{label}{unit}", items=items, height=105, y_range=limits))
     return panels
 
 
-def _median(values: FloatArray) -> float:
-    finite = values[np.isfinite(values)]
-    return float(np.median(finite)) if len(finite) else 0.0
+def _innovation_limits(d: Diagnostics, column: int, gate: float | None) -> tuple[float, float]:
+    """Return limits that show what was accepted, and the gate as it mostly is.
 
-
-def _innovation_limits(d: Diagnostics, column: int) -> tuple[float, float] | None:
-    """Return limits that show the innovations where sigma would dwarf them."""
+    The first innovations come with a sigma that would dwarf all others, and so may what is
+    rejected: both are beyond the panel then.
+    """
     size = np.abs(d.innovation[:, column])
-    size, sigma = size[np.isfinite(size)], d.sigma[:, column]
-    largest = float(size.max(initial=0.0))
-    if largest > 0.0 and 3.0 * _median(sigma) > DWARFED * largest:
-        return -1.2 * largest, 1.2 * largest
-    return None
+    used = size[np.isfinite(size) & (d.outcome == Outcome.ACCEPTED)]
+    size, sigma = size[np.isfinite(size)], d.sigma[np.isfinite(d.sigma[:, column]), column]
+    largest = float((used if len(used) else size).max(initial=0.0))
+    wide = max(3.0, gate or 0.0) * float(np.median(sigma)) if len(sigma) else 0.0
+    if wide > DWARFED * largest > 0.0:
+        wide = largest
+    limit = 1.1 * max(largest, wide)
+    if (outside := size[size > limit]).size and outside.max() < DWARFED * limit:
+        limit = 1.1 * float(outside.max())
+    return (-limit, limit) if limit > 0.0 else (-1.0, 1.0)
+
+
+def _settled(values: FloatArray, std: FloatArray | None) -> tuple[float, float] | None:
+    """Return limits that show a state and its 3 sigma once the start is over."""
+    if std is None or not len(values):
+        return None
+    sure = float(np.nanmax(std[len(values) // 2 :]))
+    settled = values[std <= 3.0 * sure]
+    low, high = float(np.nanmin(settled)), float(np.nanmax(settled))
+    room = 3.0 * sure + 0.1 * (high - low)
+    return (low - room, high + room) if room > 0.0 else None

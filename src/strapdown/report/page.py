@@ -164,6 +164,12 @@ def beside(*blocks: Block) -> Block:
     return Block(html=f'<div class="beside">{inner}</div>', needs=needs)
 
 
+def folded(title: str, block: Block) -> Block:
+    """Return a block that opens with a click on its title."""
+    inner = f"<details><summary>{escape(title)}</summary>{block.html}</details>"
+    return Block(html=inner, needs=block.needs)
+
+
 def plot(figure: Figure, caption: str = "") -> Block:
     """Return a figure, drawn when it comes into view."""
     note = f"<figcaption>{escape(caption)}</figcaption>" if caption else ""

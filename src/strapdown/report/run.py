@@ -17,6 +17,7 @@ from strapdown.evaluation import (
 from strapdown.recording import Recording
 from strapdown.report import attitude, health, navigation, page, streams
 from strapdown.report.page import Block, Page, Section
+from strapdown.report.tiles import Tiles
 from strapdown.solution import Solution
 from strapdown.units import DEG
 
@@ -32,6 +33,7 @@ def write(
     title: str | None = None,
     *,
     outages: Sequence[Window] = (),
+    tiles: Tiles | None = None,
 ) -> Path:
     """Write the report of a run: one HTML file that opens anywhere, without a network.
 
@@ -53,6 +55,8 @@ def write(
         Heading of the page; by default the name of the recording and of the filter.
     outages : sequence of Window
         Errors where fixes were withheld from the estimator.
+    tiles : Tiles, optional
+        Pictures of a map to lie below the track, from a file or folder; they go into the page.
 
     Returns
     -------
@@ -64,7 +68,7 @@ def write(
     FormatError
         If the file cannot be written.
     """
-    return page.write(compose(sol, rec, errors, title, outages=outages), path)
+    return page.write(compose(sol, rec, errors, title, outages=outages, tiles=tiles), path)
 
 
 def compose(
@@ -74,6 +78,7 @@ def compose(
     title: str | None = None,
     *,
     outages: Sequence[Window] = (),
+    tiles: Tiles | None = None,
 ) -> Page:
     """Return the page that `write` writes."""
     if errors is None:
@@ -82,20 +87,23 @@ def compose(
     of_attitude = errors.attitude if isinstance(errors, NavigationErrors) else errors
     name = str(rec.meta.get("name") or "recording")
     span = (float(sol.t[0]), float(sol.t[-1])) if len(sol.t) else None
-    sections = [
-        _summary(sol, rec, of_attitude, of_position),
+    sections = [_summary(sol, rec, of_attitude, of_position)]
+    if sol.is_navigation:
+        sections.append(navigation.track_section(sol, rec, outages, tiles))
+        if outages:
+            sections.append(navigation.outage_section(outages, causal=sol.causal))
+        if of_position is not None:
+            sections.append(navigation.error_section(of_position, span))
+        sections += [
+            navigation.sigma_section(sol),
+            navigation.mount_section(sol, rec.reference),
+        ]
+    sections += [
         attitude.scene_section(sol, rec.reference, of_attitude),
         attitude.attitude_section(sol, rec.reference, of_attitude),
     ]
     if of_attitude is not None:
         sections.append(attitude.error_section(of_attitude, span))
-    if sol.is_navigation:
-        sections.append(navigation.track_section(sol, rec, outages))
-        if outages:
-            sections.append(navigation.outage_section(outages, causal=sol.causal))
-        if of_position is not None:
-            sections.append(navigation.error_section(of_position, span))
-        sections += [navigation.sigma_section(sol), navigation.mount_section(sol)]
     sections += [
         health.bias_section(sol),
         health.innovation_section(sol),
@@ -159,30 +167,30 @@ def _summary(
         tables.append(navigation.error_table(of_position))
     if of_attitude is not None:
         tables.append(attitude.error_table(of_attitude))
-    parameters = _parameters(sol.meta)
-    if parameters:
-        tables.append(
-            page.table(("parameter", "value"), parameters, caption="Estimator, SI units")
-        )
     blocks = [page.cards(cards)]
     if tables:
         blocks.append(page.beside(*tables))
     if of_attitude is not None:
         blocks.append(page.text(*attitude.error_notes(of_attitude)))
     blocks.append(streams.stream_table(rec))
+    facts = dict(sol.meta)
+    parameters = _parameters(facts.pop("parameters", {}))
+    if found := _parameters(facts):
+        blocks.append(page.table(("fact", "value"), found, caption="From the estimator, in SI"))
+    if parameters:
+        listed = page.table(("parameter", "value"), parameters)
+        blocks.append(page.folded("Parameters of the estimator, SI units", listed))
     notes = rec.meta.get("notes")
     if isinstance(notes, (list, tuple)) and notes:
         blocks.append(page.listed("Notes on the recording", [str(note) for note in notes]))
     return Section(title="Summary", blocks=blocks)
 
 
-def _parameters(meta: Mapping[str, object]) -> list[tuple[str, str]]:
-    """Return the estimator's parameters and other facts, nested ones with dotted names."""
+def _parameters(given: object) -> list[tuple[str, str]]:
+    """Return names and values of a mapping as text, nested ones with dotted names."""
     rows: list[tuple[str, str]] = []
-    for key, value in meta.items():
-        if key == "parameters" and isinstance(value, Mapping):
-            rows += _parameters(value)
-        elif isinstance(value, Mapping):
+    for key, value in given.items() if isinstance(given, Mapping) else ():
+        if isinstance(value, Mapping):
             rows += [(f"{key}.{name}", inner) for name, inner in _parameters(value)]
         elif isinstance(value, (list, tuple, np.ndarray)):
             shown = ", ".join(_short(item) for item in list(value)[:LISTED])

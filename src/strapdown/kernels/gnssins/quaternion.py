@@ -119,7 +119,8 @@ def transition_step(
 ) -> None:
     """Write A and B of one sample: the turn e, then normalisation, at the new q.
 
-    ``A = (I - q q^T) R(e)`` with ``R(e) q = q e``; ``B = -dt D(q)`` with q in the middle.
+    ``A = (I - q q^T) R(e)`` with ``R(e) q = q e``; ``B = -dt D(q) (I - [r x] / 2)`` with the
+    rotation vector r of the turn, of which the quaternion e holds half.
     """
     # fmt: on
     # rows of R(e), less q (q^T R(e)); q^T R(e) is the old q, conjugate turn undone
@@ -138,6 +139,10 @@ def transition_step(
         ey - c * oa, -ez - c * ob, ew - c * oc, ex - c * od,
         ez - d * oa, ey - d * ob, -ex - d * oc, ew - d * od,
     )  # fmt: skip
-    write_d(w, 0.5 * (a + oa), 0.5 * (b + ob), 0.5 * (c + oc), 0.5 * (d + od))
-    for i in range(12):
-        w[W_B + i] = -dt * w[W_D + i]
+    write_d(w, a, b, c, d)
+    for i in range(4):
+        k = 3 * i
+        dx, dy, dz = w[W_D + k], w[W_D + k + 1], w[W_D + k + 2]
+        w[W_B + k] = -dt * (dx - ez * dy + ey * dz)
+        w[W_B + k + 1] = -dt * (dy - ex * dz + ez * dx)
+        w[W_B + k + 2] = -dt * (dz - ey * dx + ex * dy)

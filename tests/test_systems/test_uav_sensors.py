@@ -78,7 +78,7 @@ def test_a_wrong_printed_figure_is_missed(monkeypatch, name, value, item):
     still = sensors._truth(np.zeros((15_000, 3)))
     box = sensors.preset("mnav100ca")
     gyr = box.gyr.apply(still, rng).value
-    slow = gyr - np.array(sensors.BIAS) + sensors._slow_bias(t)
+    slow = gyr - np.array(sensors.BIAS) + sensors.slow_bias(t)
     mag, acc = box.mag.apply(still, rng).mag, box.acc.apply(still, rng).value
     monkeypatch.setattr(sensors, name, value)
     found = {

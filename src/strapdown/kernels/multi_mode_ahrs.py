@@ -231,10 +231,10 @@ def step(
     if x[STARTED] == 0.0:
         begin_given(x, P, p, 0.0)
         return
-    if (int(x[STATUS]) & s.GAP) != 0:
-        bridge_gap(x, P, p, dt, has_acc, ax, ay, az)
     x[SINCE_ACC] += dt
     x[SINCE_MAG] += dt
+    if (int(x[STATUS]) & s.GAP) != 0:
+        bridge_gap(x, P, p, dt, has_acc, ax, ay, az)
     if todo == START:  # the first field, or the first after a gap, has just set the heading
         reset_heading(x, P, p[P_STD_HEADING] * p[P_STD_HEADING])
         x[SINCE_MAG] = 0.0

@@ -4,7 +4,7 @@ State, covariance, prediction and scalar updates are those of `uav_ahrs`. Sectio
 of spec D (thesis "micro UAV", after Jang and Liccardo).
 """
 
-from math import asin, atan2, cos, inf, isnan, nan, sin
+from math import asin, atan2, cos, inf, isnan, nan, sin, sqrt
 
 from strapdown.kernels import status as s
 from strapdown.kernels._jit import Mat, Vec, kernel
@@ -101,14 +101,18 @@ def heading_left(x: Vec, p: Vec) -> float:
 
 
 @kernel
-def levelled_row(x: Vec, w: Vec) -> None:
-    """Write the derivative by q of the turn about down: an error of tilt turns the field too."""
+def levelled_row(x: Vec, p: Vec, w: Vec) -> None:
+    """Write the derivative by q of the turn about down: an error of tilt turns the field too.
+
+    The field has the dip that is measured and the heading that is predicted: with the measured one
+    its noise would be in the row as well.
+    """
     qw, qx, qy, qz = x[Q], x[Q + 1], x[Q + 2], x[Q + 3]
     north, east, down = rotate(qw, qx, qy, qz, x[MAG + 1], x[MAG + 2], x[MAG + 3])
-    k = -down / (north * north + east * east)
+    k = -down / sqrt(north * north + east * east)
     # a turn u in n is measured by the row 2 (0, u) q
     w[W_H], w[W_H + 1], w[W_H + 2], w[W_H + 3] = mul(
-        0.0, 2.0 * k * north, 2.0 * k * east, 2.0, qw, qx, qy, qz
+        0.0, 2.0 * k * p[P_COS_D], 2.0 * k * p[P_SIN_D], 2.0, qw, qx, qy, qz
     )
 
 
@@ -118,7 +122,7 @@ def correct_heading(x: Vec, P: Mat, p: Vec, w: Vec) -> None:
     left = heading_left(x, p)
     ok = not isnan(left)
     if ok and p[P_JACOBIAN] == LEVELLED:
-        levelled_row(x, w)
+        levelled_row(x, p, w)
     elif ok:
         ok = heading_row(x, w, 1.0 if p[P_JACOBIAN] == AS_PRINTED else 0.0)
     if ok:
@@ -150,10 +154,10 @@ def step(
     elif x[STARTED] == 0.0:
         begin_given(x, P, p, inf)  # the source's first step takes the heading
     else:
-        if (int(x[STATUS]) & s.GAP) != 0:
-            bridge_gap(x, P, p, dt, has_acc, ax, ay, az)
         x[SINCE_ACC] += dt
         x[SINCE_MAG] += dt
+        if (int(x[STATUS]) & s.GAP) != 0:
+            bridge_gap(x, P, p, dt, has_acc, ax, ay, az)
         if todo == START:  # the first field, or the first after a gap, has just set the heading
             reset_heading(x, P, p[P_STD_HEADING] * p[P_STD_HEADING])
             x[SINCE_MAG] = 0.0

@@ -23,13 +23,14 @@ from strapdown.kernels.memory import (
     STD_ATT,
     STD_BG,
     TILT,
-    W_HEAD,
     Q,
     advance_attitude,
     level,
     note_sigma,
 )
 from strapdown.kernels.quat import exp, mul, normalize
+from strapdown.kernels.quest_ekf_covariance import rate_matrix, turn_matrix
+from strapdown.kernels.quest_ekf_layout import W_A, W_B
 
 # --- states of x that both have ------------------------------------------------------------
 STARTED = HEAD  # 1 once tilt is known
@@ -64,73 +65,20 @@ AS_PRINTED = 1.0  # with a factor too many
 LEVELLED = 2.0  # of the angle about down, the field being levelled by the estimate
 
 # --- scratch -----------------------------------------------------------------------------
-W_A = W_HEAD  # quaternion by quaternion: 4x4
-W_B = W_HEAD + 16  # quaternion by bias: 4x3
-W_M = W_HEAD + 28  # upper rows of F P: 4x7
-W_H = W_HEAD + 56  # row of a measurement: 4
-W_DX = W_HEAD + 60  # correction found so far: 7
-W_PH = W_HEAD + 67  # P h: 7
-W_SHARED = W_HEAD + 74
+# W_A and W_B, 4x4 and 4x3, are those of the quaternion's two derivatives
+W_M = W_B + 12  # upper rows of F P: 4x7
+W_H = W_M + 28  # row of a measurement: 4
+W_DX = W_H + 4  # correction found so far: 7
+W_PH = W_DX + 7  # P h: 7
+W_SHARED = W_PH + 7
 
 UNSEEN_TIME = 0.25  # correlation time of a rate beyond the range, or of one that sticks [s]
 MIN_LEVEL = 0.01  # square of the cosine of pitch from which on a heading angle means something
 
 
 @kernel
-def turn_matrix(w: Vec, ew: float, ex: float, ey: float, ez: float) -> None:
-    """Write A, ``A q = q e``; ``I + F11 dt`` of (3.25) is ``e = (1, r / 2)``."""
-    (
-        w[W_A], w[W_A + 1], w[W_A + 2], w[W_A + 3],
-        w[W_A + 4], w[W_A + 5], w[W_A + 6], w[W_A + 7],
-        w[W_A + 8], w[W_A + 9], w[W_A + 10], w[W_A + 11],
-        w[W_A + 12], w[W_A + 13], w[W_A + 14], w[W_A + 15],
-    ) = (
-        ew, -ex, -ey, -ez,
-        ex, ew, ez, -ey,
-        ey, -ez, ew, ex,
-        ez, ey, -ex, ew,
-    )  # fmt: skip
-
-
-# fmt: off
-@kernel
-def bias_matrix(
-    w: Vec, qw: float, qx: float, qy: float, qz: float,
-    rx: float, ry: float, rz: float, dt: float,
-) -> None:
-    """Write B, what a bias does to the quaternion that r_b has turned: ``-dt Xi(q) J_r(r) / 2``.
-
-    J_r is the right Jacobian of the rotation to second order. With r zero it is ``F12 dt`` of
-    (3.25).
-    """
-    # fmt: on
-    r2 = rx * rx + ry * ry + rz * rz
-    k = -0.5 * dt
-    for j in range(3):
-        a = rx if j == 0 else (ry if j == 1 else rz)
-        ux, uy, uz = a * rx / 6.0, a * ry / 6.0, a * rz / 6.0  # column j of J_r
-        if j == 0:
-            ux += 1.0 - r2 / 6.0
-            uy -= 0.5 * rz
-            uz += 0.5 * ry
-        elif j == 1:
-            ux += 0.5 * rz
-            uy += 1.0 - r2 / 6.0
-            uz -= 0.5 * rx
-        else:
-            ux -= 0.5 * ry
-            uy += 0.5 * rx
-            uz += 1.0 - r2 / 6.0
-        bw, bx, by, bz = mul(qw, qx, qy, qz, 0.0, ux, uy, uz)
-        w[W_B + j] = k * bw
-        w[W_B + 3 + j] = k * bx
-        w[W_B + 6 + j] = k * by
-        w[W_B + 9 + j] = k * bz
-
-
-@kernel
 def congruence(P: Mat, w: Vec) -> None:
-    """``P <- F P F^T`` with ``F = [[A, B], [0, I]]``."""
+    """``P <- F P F^T`` with ``F = [[A, B], [0, I]]``, A and B of the scratch."""
     for i in range(4):
         for j in range(7):
             v = 0.0
@@ -178,13 +126,14 @@ def predict(x: Vec, P: Mat, p: Vec, w: Vec, wx: float, wy: float, wz: float, dt:
         advance_attitude(x, rx, ry, rz)
         ew, ex, ey, ez = exp(rx, ry, rz)
         turn_matrix(w, ew, ex, ey, ez)
-        bias_matrix(w, x[Q], x[Q + 1], x[Q + 2], x[Q + 3], rx, ry, rz, dt)
+        # a bias is to be subtracted from the rate
+        rate_matrix(w, x[Q], x[Q + 1], x[Q + 2], x[Q + 3], rx, ry, rz, -dt)
         congruence(P, w)
         spread(P, x, variance)
     else:
         ex, ey, ez = 0.5 * rx, 0.5 * ry, 0.5 * rz
-        turn_matrix(w, 1.0, ex, ey, ez)
-        bias_matrix(w, qw, qx, qy, qz, 0.0, 0.0, 0.0, dt)
+        turn_matrix(w, 1.0, ex, ey, ez)  # I + F11 dt and F12 dt of (3.25)
+        rate_matrix(w, qw, qx, qy, qz, 0.0, 0.0, 0.0, -dt)
         congruence(P, w)
         qw, qx, qy, qz = mul(qw, qx, qy, qz, 1.0, ex, ey, ez)
         if p[P_PROPAGATION] == DIAGONAL:
@@ -205,7 +154,7 @@ def predict(x: Vec, P: Mat, p: Vec, w: Vec, wx: float, wy: float, wz: float, dt:
 @kernel
 def due(x: Vec, clock: int, period: float, dt: float) -> bool:
     """Whether a correction is due at the sample nearest to the end of its period."""
-    return x[clock] + 0.5 * dt >= period and dt > 0.0
+    return x[clock] + 0.5 * min(dt, period) >= period and dt > 0.0
 
 
 @kernel

@@ -48,7 +48,7 @@ def run(seed: int) -> Shown:
     box: Any = preset("mnav100ca")
     still = _truth(np.zeros((_samples(), 3)))
     gyr = box.gyr.apply(still, rng).value
-    slow = gyr - np.array(BIAS) + _slow_bias(still.t)
+    slow = gyr - np.array(BIAS) + slow_bias(still.t)
     rows = [
         *_scale(box, rng), *_ranges(box, rng), *_biases(gyr, slow, still.t),
         *_noise(gyr, box.mag.apply(still, rng).mag, box.acc.apply(still, rng).value),
@@ -72,7 +72,7 @@ def _truth(omega: FloatArray, f_b: FloatArray | None = None) -> Truth:
     )  # fmt: skip
 
 
-def _slow_bias(t: FloatArray) -> FloatArray:
+def slow_bias(t: FloatArray) -> FloatArray:
     """Return (4.1), shape (n, 3) [rad/s]."""
     wave = np.sin(2.0 * np.pi * t / PERIOD)
     return np.asarray(np.array(BIAS) + np.outer(wave, SWING))
@@ -236,7 +236,7 @@ def _others() -> list[Row]:
 
 
 def _figure(t: FloatArray, slow: FloatArray) -> page.Block:
-    true = _slow_bias(t)
+    true = slow_bias(t)
     items = [
         *xyz(t, slow, names=("P", "Q", "R"), width=0.6),
         *(Series(x=t, y=true[:, k], name="(4.1)", color=REFERENCE, width=1.6) for k in range(3)),

@@ -116,7 +116,7 @@ def update_east(
     # fmt: on
     left, expected, accepted = update_turn(x, P, p, w, d, 0.0, -c, east, r)
     note(w, D_MAG, nan, nan, nan, s.ACCEPTED if accepted else s.REJECTED_GATE)
-    note_sigma(w, D_MAG, 1, left, expected)
+    note_sigma(w, D_MAG, 0, left, expected)
     return accepted
 
 
@@ -126,17 +126,19 @@ def update_field(
     x: Vec, P: Mat, p: Vec, w: Vec, north: float, east: float, down: float, c: float, d: float,
     r: float,
 ) -> None:
-    """Enter the measured unit field, turned to magnetic north, east and down."""
+    """Enter the measured unit field, turned to magnetic north, east and down.
+
+    Across the reference, to the east and in dip: along it a unit vector tells no turn, and has
+    no noise.
+    """
     # fmt: on
     if isnan(p[P_SIN_DIP]):  # the angle, not its sine: half a turn off, too, is off
         accepted = update_east(x, P, p, w, c, d, c * atan2(east, north), r)
     else:
         accepted = update_east(x, P, p, w, c, d, east, r)
-        a, va, ok_a = update_turn(x, P, p, w, 0.0, -d, 0.0, north - c, r)
-        b, vb, ok_b = update_turn(x, P, p, w, 0.0, c, 0.0, down - d, r)
-        note_sigma(w, D_MAG, 0, a, va)
-        note_sigma(w, D_MAG, 2, b, vb)
-        accepted = accepted and ok_a and ok_b
+        a, va, ok = update_turn(x, P, p, w, 0.0, 1.0, 0.0, c * down - d * north, r)
+        note_sigma(w, D_MAG, 1, a, va)
+        accepted = accepted and ok
         w[D_MAG + 6] = s.ACCEPTED if accepted else s.REJECTED_GATE
     if not accepted:
         set_status(x, s.MAG_REJECTED)

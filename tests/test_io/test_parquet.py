@@ -169,7 +169,7 @@ def test_a_solution_in_csv_holds_the_same_numbers(tmp_path: Path, sol: Solution)
 
 
 def test_a_solution_refuses_other_endings_and_damage(tmp_path: Path, sol: Solution) -> None:
-    with pytest.raises(FormatError, match=r"written as \.parquet or \.csv, got '\.json'"):
+    with pytest.raises(FormatError, match=r"written as \.parquet, \.csv, \.kml, .*got '\.json'"):
         io.write_solution(sol, tmp_path / "s.json")
     path = tmp_path / "s.parquet"
     io.write_solution(sol, path)

@@ -375,6 +375,21 @@ def test_a_mount_is_shown_from_where_it_was_found(drive, tmp_path):
     assert "The mount was not found" in reader.words
 
 
+def test_a_solution_that_rejects_what_it_measures_is_doubted(drive, tmp_path):
+    sol, rec = drive
+    d = sol.diagnostics["acc"]
+    for share, count in ((0.2, 0), (0.5, 1)):
+        outcome = np.where(np.arange(len(d.t)) < share * len(d.t), 2, 1)
+        doubtful = replace(sol, diagnostics={"gnss_position": replace(d, outcome=outcome)})
+        found = report.doubts(doubtful)
+        assert len(found) == count
+        reader = Reader(report.write(doubtful, rec, tmp_path / "r.html").read_text("utf-8"))
+        assert ("Not to be trusted" in reader.text) == bool(count)
+    assert f"{int(np.sum(outcome == 2))} of {len(d.t)} measurements of gnss_position" in found[0]
+    # an attitude filter may well refuse most of a field
+    assert report.doubts(replace(doubtful, lla=None, v_n=None, q_vb=None)) == []
+
+
 # --- the file ---------------------------------------------------------------------------
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from strapdown import __version__
 from strapdown.cli import _console, _errors, _output, _sensor, _settings, doctor
-from strapdown.errors import DataGap, InputError
+from strapdown.errors import ComputationError, DataGap, InputError
 
 if TYPE_CHECKING:
     from strapdown.evaluation import AttitudeErrors, NavigationErrors, Window
@@ -106,9 +106,12 @@ def _results(
     progress: _console.Progress,
 ) -> dict[str, Any]:
     """Run the estimator, write its files into `aside`, and return the summary."""
-    from strapdown import io
+    from strapdown import io, report
 
     sol = _solution(job, log, _without_fixes(job, rec), timing, progress)
+    doubts = report.doubts(sol)
+    for line in doubts:
+        progress.note(line)
     progress.step("comparing with the reference" if rec.reference else "writing")
     errors = _errors_of(sol, rec, progress)
     outages = _outages_of(job, log, sol, rec)
@@ -119,13 +122,9 @@ def _results(
         io.write_solution(sol, aside / files[kind])
     begun = time.perf_counter()
     if job.report:
-        from strapdown import report
-
         progress.step("writing the report")
         files["report"] = "report.html"
-        report.write(
-            sol, rec, aside / files["report"], errors, outages=outages, tiles=job.tiles
-        )
+        report.write(sol, rec, aside / files["report"], errors, outages=outages, tiles=job.tiles)
     timing["report_s"] = time.perf_counter() - begun
     return {
         _output.MARK: f"strapdown {__version__}",
@@ -141,6 +140,7 @@ def _results(
         "timing": timing,
         "errors": None if errors is None else errors.summary(),
         "outages": [window.as_dict() for window in outages],
+        "doubts": doubts,
     }
 
 
@@ -180,6 +180,7 @@ def _solution(
             f"--export {tracks[0]} needs positions, and {name} gives attitude; leave it out, or "
             "use a log with GNSS."
         )
+    _overlapping(log, rec, estimators.entry(name).needs)
     progress.step(f"estimating with {name}")
     if not estimators.entry(name).is_compiled():
         progress.note(f"compiling {name} (once)")
@@ -189,7 +190,36 @@ def _solution(
     timing["estimate_s"] = time.perf_counter() - begun
     if len(sol) == 0:
         raise InputError(f"{log}: the log must hold inertial samples, it has none.")
+    _on_the_earth(sol)
     return sol
+
+
+def _overlapping(log: str, rec: "Recording", needs: Sequence[str]) -> None:
+    """Refuse a log whose aiding lies outside the times of its inertial samples."""
+    t = rec.need("imu").t
+    for name in needs:
+        aid = rec.need(name).t
+        if len(t) and len(aid) and (aid[0] > t[-1] or aid[-1] < t[0]):
+            raise InputError(
+                f"{log}: stream {name}, {aid[0]:.6g} to {aid[-1]:.6g} s, must overlap stream imu, "
+                f"{t[0]:.6g} to {t[-1]:.6g} s; their clocks have different zeros: bring the times "
+                "of one to the other's."
+            )
+
+
+def _on_the_earth(sol: "Solution") -> None:
+    """Refuse a solution that was carried over a pole in latitude and longitude."""
+    import numpy as np
+
+    if sol.lla is None:
+        return
+    beyond = np.abs(sol.lla[:, 0]) > np.pi / 2
+    if beyond.any():
+        raise ComputationError(
+            f"{sol.filter} must keep off the poles, it came beyond one at "
+            f"{sol.t[int(np.argmax(beyond))]:.6g} s; `navigation.mechanise` goes over them with "
+            "frame='wander' or 'ecef'."
+        )
 
 
 def _without_fixes(job: Job, rec: "Recording") -> "Recording":

@@ -28,6 +28,8 @@ from strapdown.io._raw import RawLog
 from strapdown.io._registry import FormatModule, detect, module
 from strapdown.recording import STREAMS, Recording, Reference
 
+_ROUNDING = 1e-9  # of a latitude at a pole [rad]: 6 mm
+
 AnyPath = str | PathLike[str]
 
 
@@ -112,6 +114,7 @@ def read(
     turns = parse_axes(axes) if axes is not None else {}
     window = _window(start, stop)
     rec, raw = _read_all(path, format, options)
+    _on_the_earth(rec, raw.file)
     if turns:
         rec = _turned(rec, turns)
     meta = dict(rec.meta)
@@ -170,6 +173,25 @@ def read_raw(
     if all(table.stream is None for table in raw.tables):
         split(raw, options)
     return raw
+
+
+def _on_the_earth(rec: Recording, file: Any) -> None:
+    """Refuse positions beyond the poles."""
+    theirs = rec.reference.position if rec.reference is not None else None
+    for name, stream in (("gnss", rec.gnss), ("reference.position", theirs)):
+        if stream is None:
+            continue
+        beyond = np.flatnonzero(np.abs(stream.lla[:, 0]) > np.pi / 2 + _ROUNDING)
+        if len(beyond):
+            raise FormatError(
+                "latitude must lie between -90 and 90 deg, got "
+                f"{np.degrees(stream.lla[beyond[0], 0]):.6g} deg",
+                file=file,
+                stream=name,
+                row=int(beyond[0]),
+                hint="check that latitude and longitude are not swapped and which unit they "
+                "have, or leave the row out",
+            )
 
 
 def _guarded(function: Any, path: Path, options: Options) -> Any:

@@ -22,6 +22,8 @@ from strapdown.report.page import Block, Section, plot, table, text
 from strapdown.solution import Diagnostics, Outcome, Solution, Status
 from strapdown.units import DPS
 
+DOUBTFUL = 1.0 / 3.0  # share of measurements that are rejected
+LEAST_REFUSED = 10
 DWARFED = 10.0  # one over the other, from which on both cannot be seen in one panel
 
 
@@ -48,6 +50,27 @@ FLAGS: dict[Status, Flag] = {
     Status.GYR_STUCK: Flag("#8c2f39", "rates of exactly zero while the box was turning"),
     Status.OUTAGE: Flag("#b4549c", "aiding that bounds the position is missing"),
 }
+
+
+# --- doubts -----------------------------------------------------------------------------
+
+
+def doubts(sol: Solution) -> list[str]:
+    """Return why a solution is not to be trusted, one sentence each; none if nothing speaks so."""
+    found = []
+    if len(sol) and ((sol.status & Status.ALIGNING) != 0).all():
+        what = "position" if sol.is_navigation else "attitude"
+        found.append(
+            f"{sol.filter} was still aligning at the end of the log: the solution holds no {what}."
+        )
+    for name, d in sol.diagnostics.items() if sol.is_navigation else ():
+        refused = int(np.count_nonzero(d.outcome == Outcome.REJECTED_GATE))
+        if refused >= LEAST_REFUSED and refused > DOUBTFUL * len(d.t):
+            found.append(
+                f"{refused} of {len(d.t)} measurements of {name} were rejected: the solution is "
+                "not to be trusted; look at the axes of the box and at the clocks of its sensors."
+            )
+    return found
 
 
 # --- biases -----------------------------------------------------------------------------

@@ -168,6 +168,8 @@ def _summary(
     if of_attitude is not None:
         tables.append(attitude.error_table(of_attitude))
     blocks = [page.cards(cards)]
+    if doubts := health.doubts(sol):
+        blocks.append(page.listed("Not to be trusted", doubts))
     if tables:
         blocks.append(page.beside(*tables))
     if of_attitude is not None:

@@ -88,6 +88,25 @@ def test_velocity_that_is_not_the_rate_of_position_is_found(drive, turn, words):
     assert by_check(drive, "velocity")[0].severity == "ok"
 
 
+def test_noise_of_positions_does_not_hide_their_rate(drive):
+    """A receiver whose positions scatter by metres from fix to fix, as cheap ones do at 10 Hz."""
+    rng = np.random.default_rng(2)
+    lla = drive.gnss.lla + rng.normal(0.0, 2.0, drive.gnss.lla.shape) * [1.6e-7, 2e-7, 1.0]
+    (finding,) = by_check(with_fixes(drive, lla=lla), "velocity")
+    assert finding.severity == "ok"
+    exchanged = with_fixes(drive, lla=lla, v_n=drive.gnss.v_n[:, [1, 0, 2]])
+    (finding,) = by_check(exchanged, "velocity")
+    assert finding.severity == "error"
+
+
+def test_fixes_lost_under_a_bridge_are_a_note(drive):
+    t = drive.gnss.t
+    rec = replace(drive, gnss=drive.gnss.rows(np.flatnonzero((t < 60.0) | (t > 90.0))))
+    (finding,) = [f for f in by_check(rec, "time") if f.stream == "gnss"]
+    assert finding.severity == "note"
+    assert "1 gap" in finding.sentence
+
+
 def test_absurd_sigmas_stale_heading_and_jumps_are_found(drive):
     lla = drive.gnss.lla.copy()
     lla[150:, 0] += 100.0 / 6.4e6  # 100 m north from then on

@@ -240,8 +240,68 @@ def test_field_that_no_axes_explain_is_reported(box):
 
 @pytest.mark.parametrize(("bias", "severity"), [(0.5, "ok"), (2.0, "note"), (6.0, "warning")])
 def test_bias_is_weighed_by_its_size(bias, severity):
-    finding = only(turntable(rate=bias * DEG), "bias")
-    assert finding.severity == severity
+    rest = turntable(rate=0.0)
+    rest = changed_imu(rest, gyr=rest.imu.gyr + [0.0, 0.0, bias * DEG])
+    assert only(rest, "bias").severity == severity
+    # a field that turns with the rates says that they are no bias
+    assert by_check(turntable(rate=6.0 * DEG), "bias") == []
+
+
+def test_box_that_repeats_a_sample_while_it_rests_is_no_stuck_sensor(box):
+    """A coarse accelerometer shows one number at rest; the same in motion is a fault."""
+    rest = turntable(rate=0.0)
+    for rec, severity in ((rest, "note"), (box, "error")):
+        acc = rec.imu.acc.copy()
+        acc[2000:3000] = acc[2000]
+        finding = only(changed_imu(rec, acc=acc), "stuck")
+        assert finding.severity == severity
+        assert ("while the box rests" in finding.sentence) == (severity == "note")
+
+
+def test_magnetometer_that_was_not_turned_is_not_called_uncalibrated():
+    assert by_check(turntable(rate=0.0), "calibration") == []
+
+
+@pytest.mark.parametrize("scale", [0.5, 1.0, 2.0])
+def test_turning_about_the_vertical_says_nothing_of_the_gyroscopes_scale(scale):
+    """Gravity stands still in the box, so no rate is needed to explain it: any scale will do."""
+    table = replace(turntable(rate=200.0 * DEG), mag=None)
+    crooked = table.imu.gyr + 0.03 * table.imu.gyr[:, [2, 0, 1]]  # axes off by 2 deg
+    found = by_check(changed_imu(table, gyr=scale * crooked), "units")
+    assert [f.stream for f in found if f.severity != "ok"] == []
+    axes = only(changed_imu(table, gyr=scale * crooked), "axes")
+    assert axes.severity == "note"
+
+
+def test_samples_of_no_noise_are_called_so_and_nothing_else():
+    """Coning: the specific force along the cone's axis is one number, and no sensor is stuck."""
+    t = np.arange(12_000) / 200.0
+    a = 2.0 * np.pi * 10.0 * t
+    gyr = np.column_stack((1.1 * np.cos(a), 1.1 * np.sin(a), 0.0 * t))
+    acc = np.column_stack((0.17 * np.sin(a), -0.17 * np.cos(a), 0.0 * t - 9.805))
+    rec = sd.from_arrays(t, gyr, acc)
+    assert only(rec, "noise").severity == "note"
+    assert [f for f in doctor.examine(rec) if f.is_alarm] == []
+    assert by_check(rec, "filtered") == []
+
+
+def test_peak_of_a_coarse_sensor_is_no_saturation():
+    """A slow swing stays on its highest count for a while; one that is cut off stays longer."""
+    t = np.arange(6000) / 100.0
+    swing = np.round(400.0 * np.sin(0.6 * t)) / 200.0
+    gyr = np.column_stack((swing, 0.3 * swing + 0.001 * t, 0.001 * t))
+    rec = sd.from_arrays(t, gyr, np.zeros((6000, 3)) + [0.0, 0.0, -G])
+    assert by_check(rec, "clipped") == []
+    cut = changed_imu(rec, gyr=np.clip(rec.imu.gyr, -1.8, 1.8))
+    assert only(cut, "clipped").stream == "gyr"
+
+
+def test_lost_samples_of_a_log_with_fixes_are_no_crash(parking_lot):
+    """The course counts by time, the samples by number: they must meet."""
+    rec = sd.read(parking_lot)
+    keep = np.flatnonzero(np.arange(len(rec.imu)) % 12 != 5)
+    rec = replace(rec, imu=rec.imu.rows(keep))
+    assert [f for f in doctor.examine(rec) if f.check == "axes" and f.is_alarm] == []
 
 
 # --- logs as users bring them: no crash, and nothing accepted silently -----------------------

@@ -12,12 +12,14 @@ from strapdown.doctor._axes48 import DETERMINANTS, IDENTITY, SIGNED, index_of, n
 from strapdown.doctor._course import course_loss, turns_of
 from strapdown.doctor._finding import Finding, Severity
 from strapdown.doctor._log import Grid, Log
+from strapdown.doctor._rest import rest_bias, velocity_at
 from strapdown.doctor._scales import WORD, mistake_finding, scales_of
-from strapdown.doctor._turning import DECIDED, SURE, Turning, rest_bias, survivors
+from strapdown.doctor._turning import DECIDED, SURE, Turning, survivors
 from strapdown.units import DPS
 
 # What is left unexplained where a hypothesis is believed, relative to the field.
 _EXPLAINED: Final = 0.15
+_UNKNOWN_BIAS: Final = 3.0 * DPS  # of a gyroscope that is never seen at rest
 # Asked first: the unit as stated, a half and the double of it, and degrees for radians.
 _USUAL_SCALES: Final = [1.0, 0.5, 2.0, DPS, 1.0 / DPS]
 
@@ -28,6 +30,10 @@ class _Answer(NamedTuple):
     loss: FloatArray  # (blocks, scales, 48), or 96 where the course tells the field's sign
     signed: bool
     explained: bool  # False: not even the best does
+    still: float  # loss of a gyroscope that shows nothing
+    course: FloatArray  # the part of the loss that the course makes
+    turned: bool  # whether the field turned, so that no turning explains it worse
+    clear: bool  # whether what is explained is most of it
 
 
 _Ask = Callable[[list[float]], _Answer | None]
@@ -76,10 +82,13 @@ def relations(log: Log, grid: Grid, *, quick: bool = False) -> list[Relation]:
     quick : bool
         Whether not to ask for the gyroscope's unit.
     """
-    gyr = grid.fields["gyr"] - rest_bias(grid.fields["gyr"], grid.dt)
+    bias = rest_bias(grid, log.gnss)
+    gyr = grid.fields["gyr"] - bias
     gyr[grid.bad] = 0.0
     fields = {name: values for name, values in grid.fields.items() if name != "gyr"}
-    turning = Turning(gyr, fields, grid.dt, grid.bad)
+    drift = 0.0 if bias.any() else _UNKNOWN_BIAS
+    velocity = velocity_at(log.gnss, grid.t)
+    turning = Turning(gyr, fields, grid.dt, grid.bad, drift, velocity)
     found = []
     for sensor in fields:
         ask = partial(_losses, log, grid, gyr, turning, sensor)
@@ -107,15 +116,21 @@ def _losses(
     evidence = turning.evidence(sensor, scales)
     if evidence is None:
         return None
-    loss = evidence.loss
+    loss, still = evidence.loss, float(evidence.still.sum())
+    turned = float(loss.sum(axis=0).min()) < still - DECIDED
+    turns = None
     if sensor == "acc" and log.gnss is not None:
         turns = turns_of(log.gnss, grid.t, gyr, values)
-        if turns is not None:
-            course = course_loss(turns, scales, len(values) * grid.dt)
-            mirrored = [index_of(-Q) for Q in SIGNED]
-            opposite = loss + course[:, :, mirrored]
-            return _Answer(np.concatenate((loss + course, opposite), axis=2), True, True)
-    return _Answer(loss, False, evidence.residual <= _EXPLAINED)
+    if turns is None:
+        explained = evidence.residual <= _EXPLAINED
+        return _Answer(loss, False, explained, still, np.zeros_like(loss), turned, evidence.clear)
+    course = course_loss(turns, [*scales, 0.0], len(values) * grid.dt)
+    still += float(course[:, -1, IDENTITY].sum())
+    course = course[:, :-1]
+    mirrored = [index_of(-Q) for Q in SIGNED]
+    course = np.concatenate((course, course[:, :, mirrored]), axis=2)
+    loss = np.concatenate((loss, loss), axis=2) + course
+    return _Answer(loss, True, True, still, course, turned, True)
 
 
 def _relation(sensor: str, ask: _Ask, scale: float) -> Relation | None:
@@ -126,6 +141,11 @@ def _relation(sensor: str, ask: _Ask, scale: float) -> Relation | None:
     if not answer.explained:
         return Relation(sensor, scale, [], SURE)
     alive, confidence = survivors(answer.loss[:, 0])
+    if IDENTITY not in alive and not answer.turned:
+        # The field hardly turned: what speaks against the axes are accelerations, or a bias.
+        possible, share = survivors(answer.course[:, 0])
+        if IDENTITY in possible:
+            alive, confidence = possible, share
     signs = [(int(i) % 48, 0 if not answer.signed else (1 if i < 48 else -1)) for i in alive]
     return Relation(sensor, scale, _without_sign(signs), confidence)
 
@@ -139,12 +159,12 @@ def _without_sign(alive: list[tuple[int, int]]) -> list[tuple[int, int]]:
 def _scale(ask: _Ask, scales: list[float]) -> float:
     """Return the scale that explains most; another than one only when it leads clearly."""
     answer = ask(scales)
-    if answer is None or not answer.explained:
+    if answer is None or not (answer.explained and answer.clear):
         return 1.0
     loss = answer.loss
     best = loss.sum(axis=0).min(axis=1)
     k = int(best.argmin())
-    if k == 0 or best[0] - best[k] < DECIDED:
+    if k == 0 or min(best[0], answer.still) - best[k] < DECIDED:
         return 1.0
     total = loss[:, k].sum(axis=0)
     first, second = np.partition(total, 1)[:2]

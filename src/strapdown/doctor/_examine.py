@@ -11,9 +11,10 @@ from strapdown._types import BoolArray
 from strapdown.doctor import _axes, _field, _fixes, _health, _scales, _time
 from strapdown.doctor._finding import Finding, Severity, worst_first
 from strapdown.doctor._log import Grid, Log, grid_of, log_of
+from strapdown.doctor._rest import may_rest
 from strapdown.io._raw import RawLog
 from strapdown.motion import RestTest, rest_mask
-from strapdown.recording import Recording
+from strapdown.recording import Gnss, Recording
 from strapdown.units import DPS
 
 _LONGEST_S: Final = 1800.0  # of a longer log, its first part of this length is asked about axes
@@ -96,19 +97,19 @@ def _seen_on_grid(log: Log, grid: Grid, scale: float, up: str | None) -> list[Fi
         _field.mag_calibration(grid),
         *_field.dip_findings(log, grid),
     ]
-    rest = _rest(grid, scale)
+    rest = _rest(grid, log.gnss, scale)
     if rest is not None:
         gyr = scale * grid.fields["gyr"][rest]
         found.append(_health.bias_finding(gyr.mean(axis=0), len(gyr) * grid.dt))
     return [finding for finding in found if finding is not None]
 
 
-def _rest(grid: Grid, scale: float) -> BoolArray | None:
+def _rest(grid: Grid, gnss: Gnss | None, scale: float) -> BoolArray | None:
     """Return where the box rests, or None if it hardly ever does."""
     if "acc" not in grid.fields:
         return None
     gyr, acc = scale * grid.fields["gyr"], grid.fields["acc"]
-    rest = rest_mask(grid.t, gyr, acc, RestTest(max_rate=_LARGEST_BIAS)) & ~grid.bad
+    rest = rest_mask(grid.t, gyr, acc, RestTest(max_rate=_LARGEST_BIAS)) & may_rest(grid, gnss)
     return rest if rest.sum() * grid.dt > _REST_S else None
 
 

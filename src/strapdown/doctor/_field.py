@@ -6,7 +6,7 @@ from typing import Any, Final
 import numpy as np
 
 from strapdown._types import BoolArray, FloatArray
-from strapdown.doctor._finding import Finding, Severity
+from strapdown.doctor._finding import Finding, Severity, short
 from strapdown.doctor._log import Grid, Log
 from strapdown.units import DEG, UT
 
@@ -17,6 +17,8 @@ _DIP_SEEN: Final = 20.0 * DEG  # below, the sign of the angle says little
 _STRENGTH_WITHIN: Final = 0.25
 _OFFSET_NOTE: Final = 0.2  # of the field, found by a sphere
 _OFFSET_WARNING: Final = 0.5
+_EXTENT: Final = 5.0  # of the samples over their noise: below, only noise spreads them
+_DRIFT: Final = 0.02  # of the field: its strength varies so much by itself
 _COVERED: Final = 0.1  # least share of directions for a sphere to mean something
 
 
@@ -204,7 +206,9 @@ def mag_calibration(grid: Grid) -> Finding | None:
     away = m - solution[:3]
     away /= np.maximum(np.sqrt((away * away).sum(axis=1, keepdims=True)), 1e-12)
     covered = float(np.linalg.eigvalsh(np.cov(away.T))[0]) * 3.0
-    if rank < 4 or covered < _COVERED:
+    noise = float(np.sqrt(np.diff(m, axis=0).var(axis=0).sum() / 2.0))
+    extent = float(np.sqrt(m.var(axis=0).sum()))
+    if rank < 4 or covered < _COVERED or extent < _EXTENT * max(noise, _DRIFT):
         if spread < 0.05:
             return None
         return Finding(
@@ -252,7 +256,9 @@ def motion_finding(grid: Grid, scale: float) -> Finding:
     rate = scale * grid.fields["gyr"][~grid.bad]
     turned = np.abs(rate).sum(axis=0) * grid.dt / DEG
     rates = np.sqrt((rate * rate).mean(axis=0)) / DEG if len(rate) else np.zeros(3)
-    text = f"Axes x, y, z turn at {rates[0]:.2g}, {rates[1]:.2g}, {rates[2]:.2g} °/s (RMS)"
+    text = (
+        f"Axes x, y, z turn at {short(rates[0])}, {short(rates[1])}, {short(rates[2])} °/s (RMS)"
+    )
     second = float(np.sort(rates)[1])
     if float(rates.max(initial=0.0)) < 1.0 or float(turned.max(initial=0.0)) < 30.0:
         sentence = text + ": too little for axes, scales or a magnetometer to be told."

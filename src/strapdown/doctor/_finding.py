@@ -58,6 +58,11 @@ class Finding:
         return f"{self.sentence} {self.advice}".strip()
 
 
+def short(value: float) -> str:
+    """Return a number in two digits, without an exponent where it is large."""
+    return f"{value:.2g}" if abs(value) < 99.5 else f"{value:.0f}"
+
+
 def worst_first(findings: Iterable[Finding]) -> tuple[Finding, ...]:
     """Return findings in the order of their weight, those of equal weight as they came."""
     return tuple(sorted(findings, key=lambda finding: -finding.severity.rank))

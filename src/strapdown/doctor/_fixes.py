@@ -5,9 +5,9 @@ from typing import Final
 import numpy as np
 
 from strapdown.doctor._course import turns_of
-from strapdown.doctor._finding import Finding, Severity
+from strapdown.doctor._finding import Finding, Severity, short
 from strapdown.doctor._log import Grid, Log
-from strapdown.doctor._turning import rest_bias
+from strapdown.doctor._rest import rest_bias
 from strapdown.recording import Gnss
 from strapdown.units import DEG
 
@@ -18,6 +18,8 @@ _LEVER_M: Final = 3.0  # an antenna so far ahead of the turning point leads by t
 _MOVING_M_S: Final = 3.0
 _STALE_S: Final = 3.0
 _JUMP_M: Final = 30.0
+_WAY_S: Final = 4.0  # way and velocity are compared over this time
+_GAP: Final = 2.5  # median intervals
 _SIGMAS_M: Final = (1e-3, 1e3)
 
 
@@ -70,7 +72,7 @@ def _sigmas(gnss: Gnss) -> Finding | None:
     if len(std) > 20 and (np.ptp(std, axis=0) == 0.0).all():
         text = "The stated position sigmas never change: they are no estimate of the receiver."
         return _finding("sigmas", Severity.NOTE, text, advice)
-    text = f"The stated position sigmas lie between {std.min():.2g} and {std.max():.2g} m."
+    text = f"The stated position sigmas lie between {short(std.min())} and {short(std.max())} m."
     return _finding("sigmas", Severity.OK, text) if len(std) else None
 
 
@@ -138,14 +140,25 @@ def _velocity(gnss: Gnss) -> Finding | None:
     t, v = gnss.t[sound], gnss.v_n[sound]
     if len(t) < 20:
         return None
-    r = ned_from_lla(gnss.lla[sound], gnss.lla[sound][0])
-    dt = np.diff(t)[:, None]
-    rate = np.diff(r, axis=0) / dt
-    mean = 0.5 * (v[1:] + v[:-1])
-    fast = np.linalg.norm(rate[:, :2], axis=1) > _MOVING_M_S
+    r = ned_from_lla(gnss.lla[sound], gnss.lla[sound][0])[:, :2]
+    dt = np.diff(t)
+    gap = dt > max(_GAP * float(np.median(dt)), 1.0)
+    path = np.concatenate(
+        (np.zeros((1, 2)), np.cumsum(0.5 * (v[1:] + v[:-1])[:, :2] * dt[:, None], axis=0))
+    )
+    # Over seconds: from fix to fix, the noise of positions is larger than the way.
+    last = np.minimum(np.searchsorted(t, t + _WAY_S), len(t) - 1)
+    gaps = np.concatenate(([0], np.cumsum(gap)))
+    pairs = (last > np.arange(len(t))) & (gaps[last] == gaps) & (t[last] - t < 2.0 * _WAY_S)
+    if not pairs.any():
+        return None
+    seconds = (t[last] - t)[pairs, None]
+    rate = (r[last] - r)[pairs] / seconds
+    mean = (path[last] - path)[pairs] / seconds
+    fast = np.linalg.norm(rate, axis=1) > _MOVING_M_S
     if fast.sum() < 20:
         return None
-    rate, mean = rate[fast, :2], mean[fast, :2]
+    rate, mean = rate[fast], mean[fast]
     readings = {
         "is": mean,
         "has north and east exchanged against": mean[:, ::-1],
@@ -159,18 +172,18 @@ def _velocity(gnss: Gnss) -> Finding | None:
     best = min(off, key=lambda k: off[k])
     speed = float(np.median(np.linalg.norm(rate, axis=1)))
     if best == "is" and off[best] < 0.3 * speed:
-        text = f"The velocity is the rate of the position within {off[best]:.2g} m/s (median)."
+        text = f"The velocity is the rate of the position within {short(off[best])} m/s (median)."
         return _finding("velocity", Severity.OK, text)
     if off[best] < 0.3 * speed:
         text = f"The velocity {best} the rate of the position."
         return _finding("velocity", Severity.ERROR, text, "Correct the columns with --columns.")
-    text = f"The velocity is not the rate of the position: {off['is']:.2g} m/s apart (median)."
+    text = f"The velocity is not the rate of the position: {short(off['is'])} m/s apart (median)."
     return _finding("velocity", Severity.WARNING, text, "Check its columns and frame.")
 
 
 def _latency(gnss: Gnss, grid: Grid, scale: float) -> Finding | None:
     """Return the time shift at which course and gyroscope agree best."""
-    gyr = scale * (grid.fields["gyr"] - rest_bias(grid.fields["gyr"], grid.dt))
+    gyr = scale * (grid.fields["gyr"] - rest_bias(grid, gnss))
     acc = grid.fields["acc"]
     turns = turns_of(gnss, grid.t, gyr, acc)
     if turns is None or float(np.sqrt(np.mean(turns.course**2))) < 0.03:

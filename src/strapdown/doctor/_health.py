@@ -5,17 +5,23 @@ from typing import Final
 import numpy as np
 
 from strapdown._types import BoolArray, FloatArray
-from strapdown.doctor._finding import Finding, Severity
+from strapdown.doctor._finding import Finding, Severity, short
 from strapdown.doctor._log import Log, Sensor
 from strapdown.doctor._scales import WORD
+from strapdown.motion import RestTest
 from strapdown.units import DPS
 
 _STUCK_S: Final = 5.0  # one axis unchanged so long while another moves
+_REST: Final = RestTest()
+_STEADY: Final = 0.02  # spread of a field's axes at rest, of its strength
+_HELD_S: Final = 1.0  # a sample repeated for longer is rest or a fault, not a slower sensor
 _CLIPPED_RUN: Final = 3  # samples at the extreme one after another
+_CLIPPED_TIMES: Final = 2.0  # as many as lie just inside it; a peak has as many beside it
 _CLIPPED_LEAST: Final = 5  # of them in the log
 _NAN_SHARE: Final = 0.01
 _BIAS_NOTE: Final = 1.0 * DPS
 _BIAS_WARNING: Final = 5.0 * DPS
+_LEAST_NOISE: Final = {"gyr": 1e-6, "acc": 1e-5}  # SI, in a fifth of the band; sensors show 1e-4
 _SEGMENT: Final = 512  # samples of a spectrum
 _ENOUGH: Final = 200_000
 
@@ -23,12 +29,24 @@ _ENOUGH: Final = 200_000
 def health_findings(log: Log) -> list[Finding]:
     """Return what each sensor's samples show of its health."""
     out: list[Finding] = []
+    exact = _without_noise(log)
+    if exact:
+        out.append(
+            Finding(
+                check="noise",
+                severity=Severity.NOTE,
+                sentence="Gyroscope and accelerometer show no noise at all: the log is simulated, "
+                "or smoothed so that nothing is left of it.",
+                confidence=0.9,
+                stream="gyr",
+            )
+        )
     for name, sensor in log.sensors.items():
         if len(sensor.t) < 10:
             continue
         found = [
             _missing(name, sensor),
-            _stuck(name, sensor),
+            None if exact else _stuck(name, sensor, log),
             _copied(name, sensor),
             _held(name, sensor),
             _clipped(name, sensor),
@@ -36,6 +54,18 @@ def health_findings(log: Log) -> list[Finding]:
         ]
         out += [finding for finding in found if finding is not None]
     return out
+
+
+def _without_noise(log: Log) -> bool:
+    """Return whether gyroscope and accelerometer are both smooth where they are calmest."""
+    for name, least in _LEAST_NOISE.items():
+        spectra = _spectra(log.sensors[name]) if name in log.sensors else None
+        if spectra is None:
+            return False
+        high = spectra[:, int(0.8 * spectra.shape[1]) :].sum(axis=1)
+        if float(np.sqrt(np.quantile(high, 0.1))) > least:
+            return False
+    return True
 
 
 def _interval(sensor: Sensor) -> float:
@@ -52,13 +82,13 @@ def _missing(name: str, sensor: Sensor) -> Finding | None:
     return Finding(
         check="missing",
         severity=Severity.WARNING if share > _NAN_SHARE else Severity.NOTE,
-        sentence=f"{lost} samples ({100.0 * share:.2g} %) of the {WORD[name]} are no numbers.",
+        sentence=f"{lost} samples ({short(100.0 * share)} %) of the {WORD[name]} are no numbers.",
         advice="Estimators skip and flag them; look at the logger if they are many.",
         stream=name,
     )
 
 
-def _stuck(name: str, sensor: Sensor) -> Finding | None:
+def _stuck(name: str, sensor: Sensor, log: Log) -> Finding | None:
     """Return the axis that stands still while the others move."""
     values = sensor.values
     need = max(int(_STUCK_S / _interval(sensor)), 10)
@@ -78,15 +108,53 @@ def _stuck(name: str, sensor: Sensor) -> Finding | None:
             return None
         sentence = f"Axis {axes} of the {WORD[name]} stands still for "
     t = sensor.t
-    sentence += f"{t[stop - 1] - t[start]:.3g} s from {t[start]:.4g} s on."
+    sentence += f"{t[stop - 1] - t[start]:.3g} s from {t[start]:.4g} s on"
+    if _others_rest(name, log, t[start], t[stop - 1]):
+        return Finding(
+            check="stuck",
+            severity=Severity.NOTE,
+            sentence=sentence + ", while the box rests.",
+            confidence=0.8,
+            advice="A coarse sensor does so; one that is stuck would go on when the box moves.",
+            stream=name,
+        )
     return Finding(
         check="stuck",
         severity=Severity.ERROR,
-        sentence=sentence,
+        sentence=sentence + ".",
         advice="Look at the sensor's bus and the logger's column; leave that time out with "
         "--from and --to.",
         stream=name,
     )
+
+
+def _others_rest(name: str, log: Log, first: float, last: float) -> bool:
+    """Return whether the others, one of gyroscope and accelerometer among them, rest by then.
+
+    They rest where they are about as quiet as they ever are in this log.
+    """
+    seen = False
+    for other, sensor in log.sensors.items():
+        sound = np.isfinite(sensor.values).all(axis=1)
+        m = max(round(_REST.window / _interval(sensor)), 4)
+        count = int(sound.sum()) // m
+        blocks = sensor.values[sound][: count * m].reshape(count, m, 3)
+        t = sensor.t[sound][: count * m : m]
+        inside = (t >= first) & (t <= last)
+        if other == name or not inside.any():
+            continue
+        means, spreads = blocks.mean(axis=1), np.sqrt(blocks.var(axis=1).mean(axis=1))
+        size = float(np.median(np.linalg.norm(means, axis=1)))
+        limit = {"gyr": _REST.max_gyr_std, "acc": _REST.max_acc_std}.get(other, _STEADY * size)
+        floor = float(np.quantile(spreads, 0.01)) + _resolution(sensor.values[:, 0])
+        spread = float(np.quantile(spreads[inside], 0.9))
+        rate = float(np.linalg.norm(means[inside], axis=1).max())
+        if not spread <= min(_REST.factor * floor, limit) or not size > 0.0:
+            return False
+        if other == "gyr" and rate > _REST.max_rate:
+            return False
+        seen |= other != "mag"
+    return seen
 
 
 def _copied(name: str, sensor: Sensor) -> Finding | None:
@@ -119,10 +187,15 @@ def _longest_run(values: FloatArray) -> tuple[int, int]:
 def _held(name: str, sensor: Sensor) -> Finding | None:
     """Return that a slower sensor's samples are repeated."""
     same = (sensor.values[1:] == sensor.values[:-1]).all(axis=1)
-    share = float(same.mean())
+    rate = 1.0 / _interval(sensor)
+    edges = np.flatnonzero(np.r_[True, ~same, True])
+    runs = np.diff(edges)
+    runs = runs[runs <= max(_HELD_S * rate, 2.0)]
+    if len(runs) < 10:
+        return None
+    share = float(1.0 - len(runs) / runs.sum())
     if share < 0.4:
         return None
-    rate = 1.0 / _interval(sensor)
     return Finding(
         check="held",
         severity=Severity.NOTE,
@@ -145,8 +218,13 @@ def _clipped(name: str, sensor: Sensor) -> Finding | None:
         for extreme in (column.max(), column.min()):
             at = column == extreme
             count = int(at.sum())
+            span = float(np.ptp(column))
+            step = max(_resolution(column), 1e-7 * abs(extreme))
+            beside = (np.abs(column - extreme) < max(2.5 * step, 0.005 * span)) & ~at
+            if count < _CLIPPED_TIMES * beside.sum() or span <= 50.0 * step:
+                continue
             # A coarse sensor at rest stands on its extremes too, and a stuck one always.
-            if count < _CLIPPED_LEAST or np.ptp(column) <= 50.0 * _resolution(column):
+            if count < _CLIPPED_LEAST:
                 continue
             if count > worst and _run_of(at) >= _CLIPPED_RUN:
                 worst, where = count, f"{axis} at {extreme:.4g}"
@@ -175,18 +253,25 @@ def _resolution(values: FloatArray) -> float:
     return float(steps.min()) if len(steps) else 0.0
 
 
-def _spectrum(name: str, sensor: Sensor) -> Finding | None:
-    """Return what the calmest and the loudest second show of bandwidth and vibration."""
+def _spectra(sensor: Sensor) -> FloatArray | None:
+    """Return the mean squares per line of segments, the axes added; None for too few samples."""
     values = sensor.values[:_ENOUGH]
     count = len(values) // _SEGMENT
-    rate = 1.0 / _interval(sensor)
-    if count < 4 or name == "mag" or not np.isfinite(values).all():
+    if count < 4 or not np.isfinite(values).all():
         return None
     blocks = values[: count * _SEGMENT].reshape(count, _SEGMENT, 3)
     blocks = blocks - blocks.mean(axis=1, keepdims=True)
     window = np.sin(np.pi * (np.arange(_SEGMENT) + 0.5) / _SEGMENT) ** 2
     power = (np.abs(np.fft.rfft(blocks * window[:, None], axis=1)) ** 2).sum(axis=2)
-    power *= 2.0 / (_SEGMENT * (window * window).sum())  # mean square per line
+    return np.asarray(power * (2.0 / (_SEGMENT * (window * window).sum())))
+
+
+def _spectrum(name: str, sensor: Sensor) -> Finding | None:
+    """Return what the calmest and the loudest second show of bandwidth and vibration."""
+    rate = 1.0 / _interval(sensor)
+    power = None if name == "mag" else _spectra(sensor)
+    if power is None:
+        return None
     total = power.sum(axis=1)
     calm = power[total <= np.quantile(total, 0.1)].mean(axis=0)
     n = len(calm)
@@ -194,7 +279,8 @@ def _spectrum(name: str, sensor: Sensor) -> Finding | None:
     if floor > 0.0 and top < 1e-3 * floor:
         edge = int(np.argmax(calm[n // 20 :] < 0.1 * floor)) + n // 20
         cutoff = edge / n * 0.5 * rate
-        if cutoff < 0.1 * rate:
+        # a line above the edge is a motion that a low-pass would have taken away
+        if cutoff < 0.1 * rate and calm[edge:].max() < floor:
             return Finding(
                 check="filtered",
                 severity=Severity.NOTE,
@@ -214,8 +300,8 @@ def _spectrum(name: str, sensor: Sensor) -> Finding | None:
     return Finding(
         check="aliasing",
         severity=Severity.NOTE,
-        sentence=f"The {WORD[name]} shows vibration of {high:.2g} {unit} up to half its rate of "
-        f"{rate:.4g} Hz: some of it may be folded down from above.",
+        sentence=f"The {WORD[name]} shows vibration of {short(high)} {unit} up to half its rate "
+        f"of {rate:.4g} Hz: some of it may be folded down from above.",
         confidence=0.7,
         advice="Mount it softly, or sample faster with a low-pass below half the rate.",
         stream=name,

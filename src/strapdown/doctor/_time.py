@@ -5,11 +5,12 @@ from typing import Final
 import numpy as np
 
 from strapdown._types import FloatArray
-from strapdown.doctor._finding import Finding, Severity
+from strapdown.doctor._finding import Finding, Severity, short
 from strapdown.doctor._log import Log
 
 _GAP: Final = 1.5  # median intervals
 _LOST_SHARE: Final = 0.01  # of samples, from which gaps are a warning
+_LOST_FIXES: Final = 0.5  # the same of a receiver, which loses its satellites
 _JITTER_SHARE: Final = 0.2  # of the interval
 
 
@@ -53,13 +54,17 @@ def _stream(name: str, t: FloatArray) -> list[Finding]:
     jitter = float(np.sqrt(np.mean((regular - step) ** 2)))
     rate = 1.0 / step
     text = f"{rate:.4g} Hz over {sound[-1] - sound[0]:.4g} s"
-    text += f", jitter {1e3 * jitter:.2g} ms" if jitter > 1e-3 * step else ", no jitter"
+    text += f", jitter {short(1e3 * jitter)} ms" if jitter > 1e-3 * step else ", no jitter"
     if gaps.any():
         n = int(gaps.sum())
         text += f", {n} gap{'s' if n > 1 else ''}, the longest {advancing.max():.3g} s"
-        text += f", {100.0 * lost / (len(t) + lost):.2g} % of the samples lost"
+        text += f", {short(100.0 * lost / (len(t) + lost))} % of the samples lost"
     stepwise = len(regular) and jitter > _JITTER_SHARE * step
-    if lost > _LOST_SHARE * len(t):
+    if name == "gnss" and gaps.any() and lost < _LOST_FIXES * (len(t) + lost):
+        # a receiver has none under a bridge: no fault of the log
+        advice = "Estimators go on without fixes; the longer, the further off."
+        out.append(_finding(name, Severity.NOTE, text + ".", advice))
+    elif lost > _LOST_SHARE * len(t):
         advice = "Look at the logger's buffers and the transport; estimators bridge short gaps."
         out.append(_finding(name, Severity.WARNING, text + ".", advice))
     elif stepwise:

@@ -11,7 +11,7 @@ The gyroscope's unit is a further unknown: each hypothesis is asked at several s
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -25,6 +25,7 @@ _BLOCK_S: Final = 8.0  # stretch of time whose evidence counts as one, independe
 _DRAWS: Final = 400
 # What drift of the gyroscope's bias leaves at rest, relative to the field: 0.03 deg/s for 8 s.
 _LEAST: Final = 0.004
+_CLEAR: Final = 0.6
 # A difference of log likelihoods that is taken for a decision: odds of 3000 to 1.
 DECIDED: Final = 8.0
 SURE: Final = 0.99
@@ -38,12 +39,19 @@ class Evidence:
     ----------
     loss : ndarray, shape (blocks, scales, 48)
         Negative log likelihood of ``Q omega`` as the rate in the field's axes.
+    still : ndarray, shape (blocks,)
+        The same of a box that does not turn.
     residual : float
-        Typical residual of the best hypothesis, relative to the field.
+        Typical residual of the best hypothesis, relative to the field, in the windows that leave
+        least: fast motion accelerates, and long windows average it.
+    clear : bool
+        Whether the best hypothesis leaves much less than a box that does not turn.
     """
 
     loss: FloatArray
+    still: FloatArray
     residual: float
+    clear: bool
 
     def best(self) -> tuple[int, int]:
         """Return the scale and the hypothesis of least loss."""
@@ -71,23 +79,6 @@ def averaged(t: FloatArray, *fields: FloatArray) -> tuple[FloatArray, ...]:
     )
 
 
-def rest_bias(gyr: FloatArray, dt: float) -> FloatArray:
-    """Return the rate on which the quietest seconds agree, else zero, shape (3,).
-
-    At rest they do; in a slow, smooth motion the quietest are those of the largest rates.
-    """
-    m = max(round(1.0 / dt), 1)
-    blocks = gyr[: len(gyr) // m * m].reshape(-1, m, 3)
-    if not len(blocks):
-        return np.zeros(3)
-    noise = np.linalg.norm(blocks.std(axis=1), axis=1)
-    quiet = noise <= 2.0 * np.quantile(noise, 0.05)
-    means = blocks.mean(axis=1)[quiet]
-    bias = np.median(means, axis=0)
-    spread = float(np.median(np.linalg.norm(means - bias, axis=1)))
-    return np.asarray(bias if spread < 0.6 * np.linalg.norm(bias) else np.zeros(3))
-
-
 class Turning:
     """How the fields of a log turn, seen by its gyroscope; each scale is computed once.
 
@@ -101,17 +92,29 @@ class Turning:
         Interval [s].
     bad : ndarray of bool, shape (n,)
         Where a sample cannot be used.
+    drift : float
+        How far off the rates may be, the rest of a bias [rad/s].
+    velocity : ndarray, shape (n, 3), optional
+        Velocity over ground [m/s], NaN where it is not known. How it changes says which
+        changes of the specific force are no turning.
     """
 
     def __init__(
-        self, gyr: FloatArray, fields: Mapping[str, FloatArray], dt: float, bad: BoolArray
+        self,
+        gyr: FloatArray,
+        fields: Mapping[str, FloatArray],
+        dt: float,
+        bad: BoolArray,
+        drift: float = 0.0,
+        velocity: FloatArray | None = None,
     ) -> None:
-        self._gyr, self._dt = gyr, dt
+        self._gyr, self._dt, self._drift = gyr, dt, drift
         self._windows = {
             (name, span): windows
             for name, field in fields.items()
             for span in SPANS_S
-            if (windows := _windows_of(field, dt, bad, span)) is not None
+            if (windows := _windows_of(field, dt, bad, span, velocity if name == "acc" else None))
+            is not None
         }
         self._residuals: dict[float, dict[tuple[str, float], FloatArray]] = {}
 
@@ -137,11 +140,25 @@ class Turning:
                 continue
             residual = np.stack([self._at(scale)[field, span] for scale in scales], axis=1)
             typical = max(float(np.median(residual, axis=0).min()), _LEAST)
-            loss: FloatArray = np.log1p((residual / typical) ** 2)
+            other = np.hypot(windows.moved, 0.5 * span * self._drift)
+            allowed = np.hypot(typical, other)[:, None, None]
+            loss: FloatArray = np.log1p((residual / allowed) ** 2)
             seconds = np.asarray(np.flatnonzero(windows.pairs) * (0.5 * span), dtype=np.float64)
-            evidence = Evidence(by_block(loss, seconds, len(self._gyr) * self._dt), typical)
+            unturned = self._at(0.0)[field, span][:, :1]
+            still = np.log1p((unturned / allowed[:, 0]) ** 2)
+            blocks = by_block(
+                np.concatenate((loss.reshape(len(loss), -1), still), axis=1),
+                seconds,
+                len(self._gyr) * self._dt,
+            )
+            asked = blocks[:, :-1].reshape(len(blocks), *loss.shape[1:])
+            least = typical if found is None else min(typical, found.residual)
+            clear = typical < _CLEAR * float(np.median(unturned))
+            evidence = Evidence(asked, blocks[:, -1], least, clear)
             if found is None or evidence.lead() > found.lead():
                 found = evidence
+            elif least < found.residual:
+                found = replace(found, residual=least)
         return found
 
     def _at(self, scale: float) -> dict[tuple[str, float], FloatArray]:
@@ -167,6 +184,7 @@ class _Windows:
 
     weighted: FloatArray
     pairs: BoolArray
+    moved: FloatArray  # (pairs,), change of acceleration that is known, relative to the field
 
     def changes(self, R: FloatArray) -> FloatArray:
         """Return the changes of the means of R_ij f_l from window to window, (pairs, 3, 9)."""
@@ -176,7 +194,9 @@ class _Windows:
         return np.asarray(np.diff(mean, axis=0)[self.pairs])
 
 
-def _windows_of(field: FloatArray, dt: float, bad: BoolArray, span: float) -> _Windows | None:
+def _windows_of(
+    field: FloatArray, dt: float, bad: BoolArray, span: float, velocity: FloatArray | None
+) -> _Windows | None:
     """Return the field's windows of half a span; None if there are too few of them."""
     h = round(0.5 * span / dt)
     count = len(field) // h if h >= 4 else 0
@@ -189,13 +209,27 @@ def _windows_of(field: FloatArray, dt: float, bad: BoolArray, span: float) -> _W
         return None
     window = np.sin(np.pi * (np.arange(h) + 0.5) / h) ** 2
     window /= window.sum() * size
-    return _Windows(field[: count * h].reshape(count, h, 3) * window[:, None], pairs)
+    moved = np.zeros(count - 1)
+    if velocity is not None:
+        rate = np.gradient(velocity[: count * h], dt, axis=0).reshape(count, h, 3)
+        moved = np.linalg.norm(np.diff(np.einsum("kij,i->kj", rate, window), axis=0), axis=1)
+        known = np.isfinite(moved)
+        if (pairs & known).any():  # else no fix tells of accelerations at all
+            pairs &= known
+        moved = np.nan_to_num(moved)
+    return _Windows(
+        field[: count * h].reshape(count, h, 3) * window[:, None], pairs, np.asarray(moved[pairs])
+    )
 
 
 def by_block(loss: FloatArray, seconds: FloatArray, duration: float) -> FloatArray:
-    """Return losses summed over each block of time; `seconds` from the start do not decrease."""
-    block = (seconds // _BLOCK_S).astype(np.int64)
-    out = np.zeros((int(duration // _BLOCK_S) + 1, *loss.shape[1:]))
+    """Return losses summed over each block of time; `seconds` from the start do not decrease.
+
+    What is later than the duration, as where samples were lost, falls into the last block.
+    """
+    last = int(duration // _BLOCK_S)
+    block = np.minimum((seconds // _BLOCK_S).astype(np.int64), last)
+    out = np.zeros((last + 1, *loss.shape[1:]))
     first = np.flatnonzero(np.diff(block, prepend=-1))
     out[block[first]] = np.add.reduceat(loss, first, axis=0)
     return out

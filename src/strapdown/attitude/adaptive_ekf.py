@@ -99,8 +99,8 @@ class AdaptiveEkf(AttitudeEstimator):
     uniform_time : float
         How long motion must be uniform for a reset [s].
     uniform_gyr, uniform_acc : float
-        Uniform motion: rate less bias, and ``||f| - g|`` and the change of the receiver's speed,
-        are below these [rad/s], [m/s^2].
+        Uniform motion: rate less bias is below the one; ``||f| - g|``, the change of the force
+        and that of the receiver's speed below the other [rad/s], [m/s^2].
     reset_every : float
         Least time between resets [s]. Infinite switches resets off.
     limit : float

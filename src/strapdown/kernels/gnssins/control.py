@@ -44,6 +44,7 @@ from strapdown.kernels.gnssins.layout import (
     REF_H,
     REFUSED,
     SINCE_TRG,
+    SLOW_F,
     U_DOT,
     W_NEW,
     W_ROW,
@@ -91,9 +92,15 @@ def observe(
     x[MEAN_F] += k * (fx - x[MEAN_F])
     x[MEAN_F + 1] += k * (fy - x[MEAN_F + 1])
     x[MEAN_F + 2] += k * (fz - x[MEAN_F + 2])
+    k = dt / (p[P_QUIET_TIME] + dt)
+    x[SLOW_F] += k * (x[MEAN_F] - x[SLOW_F])
+    x[SLOW_F + 1] += k * (x[MEAN_F + 1] - x[SLOW_F + 1])
+    x[SLOW_F + 2] += k * (x[MEAN_F + 2] - x[SLOW_F + 2])
     x[QUIET] += dt
     if not uniform(x, p):
         x[QUIET] = 0.0
+        for i in range(3):
+            x[SLOW_F + i] = x[MEAN_F + i]
         if x[AGE] > SMOOTHING and x[MODE] == ALIGNMENT:  # it moves: no static alignment
             x[AGE] = p[P_ALIGN_TIME]
     if x[MODE] != ALIGNMENT or x[AGE] >= p[P_ALIGN_TIME]:
@@ -102,14 +109,19 @@ def observe(
 
 @kernel
 def uniform(x: Vec, p: Vec) -> bool:
-    """Whether rate and ``||f| - g|`` are below their thresholds; with GPS, ``u'`` as well."""
+    """Whether rate, ``||f| - g|`` and the force's change are small; with GPS, ``u'`` as well.
+
+    Pulling away with 2.5 m/s^2 makes only 0.3 m/s^2 of the modulus, but all of the change.
+    """
     wx, wy, wz = x[MEAN_G] - x[BG], x[MEAN_G + 1] - x[BG + 1], x[MEAN_G + 2] - x[BG + 2]
     fx, fy, fz = x[MEAN_F], x[MEAN_F + 1], x[MEAN_F + 2]
     still = wx * wx + wy * wy + wz * wz < p[P_QUIET_GYR] * p[P_QUIET_GYR]
     off_g = sqrt(fx * fx + fy * fy + fz * fz) - x[GRAVITY]
     calm = abs(off_g) < p[P_QUIET_ACC]
+    dx, dy, dz = fx - x[SLOW_F], fy - x[SLOW_F + 1], fz - x[SLOW_F + 2]
+    same = dx * dx + dy * dy + dz * dz < p[P_QUIET_ACC] * p[P_QUIET_ACC]
     steady = x[FIX_AGE] >= p[P_TIMEOUT] or abs(x[U_DOT]) < p[P_QUIET_ACC]
-    return bool(still and calm and steady)
+    return bool(still and calm and same and steady)
 
 
 @kernel
@@ -282,8 +294,8 @@ def trigger(
 def wants_trigger(x: Vec, p: Vec, has_acc: bool, has_mag: bool, dt: float) -> bool:
     """MasterTRG: the timer has run out, and the sample has what a measurement needs.
 
-    A field that comes more slowly than the IMU's samples is waited for, for one period.
+    A field that comes more slowly is waited for, if its samples are less than two periods apart.
     """
     if not has_acc or x[SINCE_TRG] < p[P_PERIOD] - 0.5 * dt:
         return False
-    return has_mag or isinf(x[MAG_AGE]) or x[MAG_AGE] > p[P_PERIOD]
+    return has_mag or isinf(x[MAG_AGE]) or x[MAG_AGE] > 2.0 * p[P_PERIOD]

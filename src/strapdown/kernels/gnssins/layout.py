@@ -39,7 +39,8 @@ FIX_REFUSED = HEAD + 36  # how long fixes have been rejected [s]
 Q_KEPT = HEAD + 37  # attitude while the head of x says the identity: kept?, q_nb: 5
 LAST_F = HEAD + 42  # last specific force, compensated [m/s^2]: 3
 SINCE_FIX = HEAD + 45  # since the last fix that counted [s]
-X_SIZE = HEAD + 46
+SLOW_F = HEAD + 46  # the force smoothed for as long as motion must be uniform [m/s^2]: 3
+X_SIZE = HEAD + 49
 
 ALIGNMENT = 0.0
 GPS_OFF = 1.0

@@ -54,6 +54,7 @@ from strapdown.kernels.gnssins.layout import (
     SINCE_FIX,
     SINCE_PV,
     SINCE_TRG,
+    SLOW_F,
     TEMP,
     W_FIX,
     W_NEW,
@@ -248,6 +249,7 @@ def step(
     if todo == START or dt == 0.0:
         x[MEAN_G], x[MEAN_G + 1], x[MEAN_G + 2] = wx, wy, wz
         x[MEAN_F], x[MEAN_F + 1], x[MEAN_F + 2] = fx, fy, fz
+        x[SLOW_F], x[SLOW_F + 1], x[SLOW_F + 2] = fx, fy, fz
     observe(x, p, dt, wx, wy, wz, fx, fy, fz)
     mode = parameters_of(x, p)
     integrate(x, P, p, w, mode, dt, wx - bx, wy - by, wz - bz)

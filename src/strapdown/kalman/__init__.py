@@ -15,6 +15,7 @@ own; these tools are what the theses describe in general, on matrices of any siz
 `van_loan`, `transition`,           from continuous to discrete: exact, or by series
 `noise_series`, `input_matrix`
 `nees`, `nis`, `mean_bounds`        is a filter as sure as it should be?
+`observability`                     what measurements tell of a state, and what stays open
 ==================================  ========================================================
 """
 
@@ -29,6 +30,7 @@ from strapdown.kalman.nonlinear import (
     run_extended,
     run_linearised,
 )
+from strapdown.kalman.observability import Observed, observability
 from strapdown.kalman.shaping import Augmented, NoiseModel, augment, gauss_markov, wiener
 from strapdown.kalman.steady import SteadyState, run_constant, steady_state
 
@@ -38,6 +40,7 @@ __all__ = [
     "Estimate",
     "Information",
     "NoiseModel",
+    "Observed",
     "SteadyState",
     "Track",
     "augment",
@@ -51,6 +54,7 @@ __all__ = [
     "nees",
     "nis",
     "noise_series",
+    "observability",
     "predict",
     "run",
     "run_constant",

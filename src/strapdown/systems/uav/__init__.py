@@ -1,6 +1,13 @@
 """Thesis D, the AHRS of a micro UAV: its experiments."""
 
 from strapdown.systems._parts import Part
-from strapdown.systems.uav import sensors
+from strapdown.systems.uav import ahrs, equations, outages, sensors, slow_biases, tight
 
-PARTS: tuple[Part, ...] = (sensors.PART,)
+PARTS: tuple[Part, ...] = (
+    sensors.PART,
+    equations.PART,
+    ahrs.PART,
+    outages.PART,
+    slow_biases.PART,
+    tight.PART,
+)

@@ -29,6 +29,8 @@ CONVERGED: Final = 30.0  # errors count from here on [s]
 GPS_RATE: Final = 25.0  # [Hz]
 GPS_NOISE: Final = 0.1  # [m/s], 0.6 deg of course
 STEP: Final = 3.0  # between the points of a track [m]
+ANGLES: Final = ("roll", "pitch", "yaw")
+AXES: Final = ("P", "Q", "R")
 
 Mission = Literal["first", "tight"]
 # Quarter turns, right positive; seconds of straight flight before each, seconds of the turn.
@@ -207,3 +209,18 @@ def errors(sol: Solution, flown: Log) -> FloatArray:
     """
     off = rpy_from_quat(sol.q_nb) - flown.rpy
     return np.asarray((off + np.pi) % (2.0 * np.pi) - np.pi) / DEG
+
+
+def rpy_deg(sol: Solution) -> FloatArray:
+    """Return roll, pitch and yaw of a solution [deg]."""
+    return np.asarray(rpy_from_quat(sol.q_nb)) / DEG
+
+
+def mean_abs(off: FloatArray, flown: Log) -> FloatArray:
+    """Return the mean absolute errors after convergence, shape (3,) [deg]."""
+    return np.asarray(np.abs(off[flown.late]).mean(axis=0))
+
+
+def largest(off: FloatArray, flown: Log) -> FloatArray:
+    """Return the largest absolute errors after convergence, shape (3,) [deg]."""
+    return np.asarray(np.abs(off[flown.late]).max(axis=0))

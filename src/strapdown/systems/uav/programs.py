@@ -57,7 +57,7 @@ def standard(m: Memory, mag: FloatArray, acc: FloatArray, gyr: FloatArray) -> No
     m.P[np.diag_indices(7)] += [1e-8] * 4 + [1e-12] * 3
     m.count += 1
     if m.count % 2 == 0:
-        h, H = _vector(m.x[:4], np.array([0.0, 0.0, -G]))
+        h, H = vector(m.x[:4], np.array([0.0, 0.0, -G]))
         _correct(m, acc - h, H, VAR_ACC * np.eye(3))
     if m.count % 5 == 1:
         roll, pitch = m.tilt
@@ -65,7 +65,7 @@ def standard(m: Memory, mag: FloatArray, acc: FloatArray, gyr: FloatArray) -> No
         level_x += (mag[1] * np.sin(roll) + mag[2] * np.cos(roll)) * np.sin(pitch)
         level_y = mag[1] * np.cos(roll) - mag[2] * np.sin(roll)
         m.x[:4] /= np.linalg.norm(m.x[:4])
-        yaw, H = _heading(m.x[:4])
+        yaw, H = heading(m.x[:4])
         _correct(m, [_wrap(np.arctan2(-level_y, level_x) - yaw)], H, VAR_PSI * np.eye(1))
     _finish(m)
 
@@ -95,27 +95,37 @@ def multi_mode(
     _predict(m, gyr)
     m.x[:4] /= np.linalg.norm(m.x[:4])
     V = np.zeros((7, 6))
-    V[:4, :3] = DT * _of_rate(m.x[:4])
+    V[:4, :3] = DT * of_rate(m.x[:4])
     V[4:, 3:] = DT * np.eye(3)
     m.P[np.diag_indices(7)] += np.diag(V @ np.diag(NOISE) @ V.T)
     m.count += 1
     if m.count % 2 == 0:
-        h, H = _vector(m.x[:4], np.array(FIELD))
+        h, H = vector(m.x[:4], np.array(FIELD))
         left = mag - h
         if valid:
-            yaw, row = _heading(m.x[:4])
+            yaw, row = heading(m.x[:4])
             left = np.append(left, _wrap(np.arctan2(v_n[1], v_n[0]) - yaw))
             H, R = np.vstack((H, row)), [VAR_MAG] * 3 + [VAR_COURSE]
         else:
-            h, rows = _vector(m.x[:4], np.array([0.0, 0.0, -G]))
+            h, rows = vector(m.x[:4], np.array([0.0, 0.0, -G]))
             left = np.concatenate((left, acc - h))
             H, R = np.vstack((H, rows)), [VAR_MAG] * 3 + [VAR_ACC] * 3
         _correct(m, left, H, np.diag(R))
     _finish(m)
 
 
-def _of_rate(q: FloatArray) -> FloatArray:
-    """Return A2 (3.9), what a bias makes of the quaternion's derivative."""
+def of_rate(q: FloatArray) -> FloatArray:
+    """Return A2 (3.9), what a bias makes of the quaternion's derivative.
+
+    Parameters
+    ----------
+    q : ndarray, shape (4,)
+        Quaternion.
+
+    Returns
+    -------
+    ndarray, shape (4, 3)
+    """
     w, x, y, z = q
     return 0.5 * np.array([[x, y, z], [-w, z, -y], [-z, -w, x], [y, -x, -w]])
 
@@ -126,7 +136,7 @@ def _predict(m: Memory, gyr: FloatArray) -> None:
     omega = np.array([[0, -p, -q, -r], [p, 0, r, -q], [q, -r, 0, p], [r, q, -p, 0]])
     F = np.eye(7)
     F[:4, :4] += 0.5 * DT * omega
-    F[:4, 4:] = DT * _of_rate(m.x[:4])
+    F[:4, 4:] = DT * of_rate(m.x[:4])
     m.x[:4] = F[:4, :4] @ m.x[:4]
     m.P = F @ m.P @ F.T
 
@@ -140,8 +150,21 @@ def _correct(m: Memory, left: FloatArray | list[float], H: FloatArray, R: FloatA
     m.x[:4] /= np.linalg.norm(m.x[:4])
 
 
-def _vector(q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return C (1.8) times v, and its derivative by q (C1 and C2)."""
+def vector(q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return C (1.8) times v, and its derivative by q (C1 and C2).
+
+    Parameters
+    ----------
+    q : ndarray, shape (4,)
+        Quaternion.
+    v : ndarray, shape (3,)
+        Vector in n.
+
+    Returns
+    -------
+    ndarray, shape (3,)
+    ndarray, shape (3, 4)
+    """
     w, x, y, z = q
     C = np.array([
         [w * w + x * x - y * y - z * z, 2 * (x * y + w * z), 2 * (x * z - w * y)],
@@ -155,12 +178,26 @@ def _vector(q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray]:
     return C @ v, 2.0 * np.array([[a, b, c, d], [d, -c, b, -a], [-c, -d, a, b]])
 
 
-def _heading(q: FloatArray) -> tuple[float, FloatArray]:
-    """Return yaw and its derivative as both programs have it, one factor beta too many."""
+def heading(q: FloatArray, *, exact: bool = False) -> tuple[float, FloatArray]:
+    """Return yaw and its derivative, exact, or as in both programs, a factor beta too many.
+
+    Parameters
+    ----------
+    q : ndarray, shape (4,)
+        Quaternion.
+    exact : bool
+        The derivative of the arctangent.
+
+    Returns
+    -------
+    float
+        Yaw [rad].
+    ndarray, shape (1, 4)
+    """
     w, x, y, z = q
     alpha, beta = 2.0 * (x * y + w * z), 1.0 - 2.0 * (y * y + z * z)
     c = 2.0 / (alpha**2 + beta**2)
-    t0, t1 = beta * c, alpha * c * beta
+    t0, t1 = beta * c, alpha * c * (1.0 if exact else beta)
     return float(np.arctan2(alpha, beta)), np.array(
         [[z * t0, y * t0, x * t0 + 2 * y * t1, w * t0 + 2 * z * t1]]
     )

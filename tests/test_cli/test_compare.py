@@ -49,6 +49,10 @@ def test_the_report_is_one_page_with_all_names(command, two_logs, tmp_path):
     text = (tmp_path / "compared.html").read_text()
     assert all(word in text for word in ("madgwick", "mahony", "first", "second"))
     assert "mean of 2" in done.out
+    # each table names its log, and each of its rows the filter, whatever the width of the paper
+    assert [line.split()[0] for line in done.out.splitlines() if line.startswith("ma")] == [
+        "madgwick", "mahony",
+    ] * 3  # fmt: skip
     assert "compared.html" in done.out
 
 

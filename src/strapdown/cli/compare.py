@@ -1,6 +1,6 @@
 """``strapdown compare``: several estimators on several logs, side by side."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -112,27 +112,27 @@ def _fitting(rec: "Recording") -> "dict[str, Estimator]":
 
 
 def _print(table: "Sequence[Trial]") -> None:
-    """Print a row per log and filter, and the means if there are several logs."""
+    """Print a table per log, a row per filter, and the means if there are several logs."""
     from strapdown import evaluation
 
-    rows = []
-    shown: list[str] = []
-    for trial in table:
-        figures = trial.summary()["errors"] or {}
-        shown += [key for key in figures if _is_main(key) and key not in shown]
-    for trial in table:
-        figures = trial.summary()["errors"] or {}
-        rows.append((Path(trial.log).stem, trial.label, *(_cell(figures.get(k)) for k in shown)))
+    figures = [trial.summary()["errors"] or {} for trial in table]
+    shown = list(dict.fromkeys(key for own in figures for key in own if _is_main(key)))
     header = tuple(key.replace("_rmse_", " ").replace("m_s", "m/s") for key in shown)
-    right = range(2, 3 + len(shown))
-    _console.print_table("RMSE", ("log", "filter", *header), rows, right=right)
-    if len({trial.log for trial in table}) > 1:
+
+    def show(title: str, rows: "Iterable[tuple[str, Mapping[str, float]]]") -> None:
+        cells = [(name, *(_cell(own.get(key)) for key in shown)) for name, own in rows]
+        right = range(1, 1 + len(shown))
+        _console.print_table(title, ("filter", *header), cells, right=right)
+
+    logs = list(dict.fromkeys(trial.log for trial in table))
+    for log in logs:
+        rows = ((t.label, own) for t, own in zip(table, figures, strict=True) if t.log == log)
+        show(f"RMSE, {Path(log).stem}", rows)
         print()
-        means = [
-            (f"mean of {row['logs']}", row["filter"], *(_cell(row.get(key)) for key in shown))
-            for row in evaluation.means(table)
-        ]
-        _console.print_table("", ("", "filter", *header), means, right=right)
+    if len(logs) > 1:
+        means = evaluation.means(table)
+        show(f"RMSE, mean of {len(logs)} logs", ((row["filter"], row) for row in means))
+        print()
 
 
 def _is_main(key: str) -> bool:

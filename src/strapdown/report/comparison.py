@@ -49,10 +49,10 @@ def compose(table: Sequence[Trial]) -> Page:
     logs = list(dict.fromkeys(trial.log for trial in table))
     labels = list(dict.fromkeys(trial.label for trial in table))
     colors = {label: COLORS[i % len(COLORS)] for i, label in enumerate(labels)}
-    sections = [Section(title="Summary", blocks=[_mean_table(table), _table(table)])]
+    sections = [Section(title="Summary", blocks=[_mean_table(table)])]
     for log in logs:
         own = [trial for trial in table if trial.log == log]
-        sections.append(Section(title=_short(log), blocks=_figures(own, colors)))
+        sections.append(Section(title=_short(log), blocks=[_table(own), *_figures(own, colors)]))
     return Page(
         title=f"Comparison of {len(labels)} estimators",
         subtitle=f"{len(logs)} logs" if len(logs) > 1 else logs[0],
@@ -70,7 +70,7 @@ def _columns(rows: Sequence[dict[str, object]]) -> list[str]:
 
 
 def heading(key: str) -> str:
-    """Return ``total [deg]`` of ``total_rmse_deg``.
+    """Return ``total [°]`` of ``total_rmse_deg``.
 
     Parameters
     ----------
@@ -82,12 +82,12 @@ def heading(key: str) -> str:
     str
     """
     name, _, unit = key.partition("_rmse_")
-    return f"{name.replace('_', ' ')} [{unit.replace('m_s', 'm/s')}]"
+    return f"{name.replace('_', ' ')} [{unit.replace('m_s', 'm/s').replace('deg', '°')}]"
 
 
 def _mean_table(table: Sequence[Trial]) -> Block:
     rows = means(table)
-    keys = _columns(rows)
+    keys = [key for key in _columns(rows) if key.partition("_")[0] not in ("roll", "pitch", "yaw")]
     cells = [
         [row["filter"], row["logs"], *(row.get(key) for key in keys), row["ns_per_sample"] / 1e3]
         for row in rows
@@ -96,15 +96,11 @@ def _mean_table(table: Sequence[Trial]) -> Block:
     return page.table(header, cells, caption="RMSE, mean over the logs", digits=3)
 
 
-def _table(table: Sequence[Trial]) -> Block:
-    rows = [trial.summary() for trial in table]
+def _table(own: Sequence[Trial]) -> Block:
+    rows = [trial.summary() for trial in own]
     keys = _columns([row["errors"] or {} for row in rows])
-    cells = [
-        [_short(row["log"]), row["filter"], *((row["errors"] or {}).get(key) for key in keys)]
-        for row in rows
-    ]
-    header = ["log", "filter", *(heading(key) for key in keys)]
-    return page.table(header, cells, caption="RMSE of each log", digits=3)
+    cells = [[row["filter"], *((row["errors"] or {}).get(key) for key in keys)] for row in rows]
+    return page.table(["filter", *(heading(key) for key in keys)], cells, caption="RMSE", digits=3)
 
 
 def _figures(own: Sequence[Trial], colors: dict[str, str]) -> list[Block]:
@@ -123,7 +119,7 @@ def _figures(own: Sequence[Trial], colors: dict[str, str]) -> list[Block]:
             if trial.errors is not None and len(trial.errors)
         ]
         if items:
-            panels.append(Panel(y_label=f"{name} error [deg]", items=items, height=190))
+            panels.append(Panel(y_label=f"{name} error [°]", items=items, height=190))
     positions = [
         Series(
             x=trial.position.t,

@@ -10,7 +10,7 @@ from strapdown.systems import Verdict, parts
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 
 
-@pytest.mark.parametrize("system", ["platform", "indoor"])
+@pytest.mark.parametrize("system", ["platform", "indoor", "uav"])
 def test_page_counts_the_verdicts_of_every_part(system):
     lines = (DOCS / f"system-{system}.md").read_text("utf-8").splitlines()
     table = [
@@ -46,3 +46,28 @@ def test_figures_in_the_text_of_the_indoor_unit():
     assert abs(float(left.split()[0])) < 0.015
     assert round(servo["6.3.1, swings of 0.3 s, size of the swings"].here) == 53
     assert round(servo["6.3.1, swings of 0.3 s, slope of yaw"].here, 1) == 2.2
+
+
+def test_figures_in_the_text_of_the_uav():
+    found = rows("uav", "ahrs")
+    worst = [row.here for item, row in found.items() if "multi-mode corrected, largest" in item]
+    assert max(worst) < 0.8
+    roll, yaw = (found[f"S3, figure 4.{k}, corrected, {what}"].here for k, what in
+                 ((7, "roll in turns"), (9, "yaw")))  # fmt: skip
+    assert roll.startswith("mean errors 2.6 ")
+    assert yaw.startswith("mean errors 2.4 ")
+    better = found["S3, 4.2.1, corrected, improvement, mean of the three angles"].here
+    assert round(better) == 92
+    printed = found["S1, 4.2.1, multi-mode as printed, largest error of yaw after 30 s"].here
+    assert f"{printed:.1f}" == "1.3"
+    assert (
+        round(found["S1, 4.2.1, multi-mode corrected, largest error of yaw after 30 s"].here, 1)
+        == 0.5
+    )
+    lost = [row.here for item, row in rows("uav", "outages").items()
+            if "multi-mode corrected, largest" in item]  # fmt: skip
+    assert (round(min(lost), 1), round(max(lost), 1)) == (1.3, 2.4)
+    helped = [
+        row.here for item, row in rows("uav", "outages").items() if "manoeuvres in R" in item
+    ]
+    assert max(helped) < 1.0

@@ -100,6 +100,39 @@ def test_motion_may_begin_upside_down_or_at_the_poles(start):
     assert rms(error, rec.imu.t) < 3 * LEAN
 
 
+def test_a_log_may_begin_in_the_middle_of_a_motion():
+    """The force is then off gravity, by 8 m/s^2 here: level and heading come in two seconds."""
+    t = np.arange(3000) / RATE
+    r_nb = hand.attitude(t + 100.0)
+    gyr = np.concatenate((np.zeros((1, 3)), (r_nb[:-1].inv() * r_nb[1:]).as_rotvec() * RATE))
+    pull = 8.0 * np.stack([np.cos(7.0 * t), np.sin(7.0 * t), 0.0 * t], axis=1)  # on a circle
+    acc = r_nb.inv().apply(pull - [0.0, 0.0, hand.G])
+    field = r_nb.inv().apply(hand.FIELD_N)
+    flt = RobustEskf(gravity=hand.G)
+    rec = log(t, gyr, acc, field)
+    sol = flt.run(rec)
+    error = hand.degrees_off(sol.q_nb, r_nb)
+    assert error[0] > 30.0
+    # circling changes velocity by up to 2.3 m/s, over 2 s of gravity 6.7 deg, and by the dip's
+    # tangent twice that in heading
+    assert error[200:500].max() < 15.0
+    assert rms(error, t, 10.0) < 3.0
+    smoothed = flt.smooth(rec)
+    # a third of the filter's own error there, which is 13 to 60 deg
+    assert hand.degrees_off(smoothed.q_nb, r_nb)[:200].max() < 5.0
+    assert np.all(smoothed.std_attitude_n[:200] < np.radians(6.0))
+
+
+def test_level_is_sought_anew_after_a_gap_while_moving():
+    """Heading stays, uncertain; the gap's end is no rest."""
+    rec, r_nb, _ = noisy(duration=40.0)
+    rows = np.r_[0:2000, 2300:4000]
+    rec = with_data(rec, rows)
+    error = hand.degrees_off(RobustEskf().smooth(rec).q_nb, r_nb[rows])
+    assert error[2000:2200].max() < 6.0  # heading came with the field, over seconds
+    assert error[2500:].max() < 3.0
+
+
 def test_heading_is_true_with_a_declination_and_magnetic_without():
     t = np.arange(500) / RATE
     r_nb, gyr, acc, field = hand.sensors(t)

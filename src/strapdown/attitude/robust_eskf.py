@@ -21,8 +21,10 @@ _POSITIVE = (
 )  # fmt: skip
 _NOT_NEGATIVE = (
     "gyr_rate_noise", "gyr_bias_walk", "gyr_scale_std", "mag_walk", "mag_delay_std", "rate_walk",
-    "latency", "timing_std", "field_std",
+    "latency", "field_std",
 )  # fmt: skip
+# Deviation of the latency [s] where none is declared, and where one is.
+_TIMING_UNKNOWN, _TIMING_DECLARED = 2e-3, 5e-4
 
 
 @register(
@@ -93,8 +95,9 @@ class RobustEskf(AttitudeEstimator):
         Time between two updates [s].
     latency : float
         How far the solution is turned forward [s], for sensors whose samples come late.
-    timing_std : float
-        Deviation of the latency [s]; enters the stated deviations only.
+    timing_std : float, optional
+        Deviation of the latency [s]; enters the stated deviations only. None: 2 ms where no
+        latency is declared, 0.5 ms where one is.
     field_std : float
         Deviation of the local field's heading [rad], which no averaging takes away; enters
         the stated deviation of the heading only.
@@ -134,14 +137,14 @@ class RobustEskf(AttitudeEstimator):
     )
     gyr_noise: float = 1.5e-3
     gyr_rate_noise: float = 5e-4
-    gyr_bias_walk: float = 3e-5
+    gyr_bias_walk: float = 8e-5
     gyr_bias_std: float = 2.0 * DPS
     gyr_scale_std: float = 5e-3
     acc_noise: float = 0.05
     acc_bias_std: float = 0.02
     velocity_std: float = 0.35
     velocity_time: float = 0.5
-    mag_std: float = 0.3 * UT
+    mag_std: float = 0.2 * UT
     mag_time: float = 10.0
     mag_walk: float = 0.04 * UT
     mag_delay_std: float = 0.015
@@ -152,7 +155,7 @@ class RobustEskf(AttitudeEstimator):
     rate_walk: float = 2.0
     interval: float = 0.1
     latency: float = 0.0
-    timing_std: float = 0.002
+    timing_std: float | None = None
     field_std: float = 2.0 * DEG
     gravity: float = G0
 
@@ -163,6 +166,8 @@ class RobustEskf(AttitudeEstimator):
             _checks.positive(name, getattr(self, name))
         for name in _NOT_NEGATIVE:
             _checks.positive(name, getattr(self, name), allow_zero=True)
+        if self.timing_std is not None:
+            _checks.positive("timing_std", self.timing_std, allow_zero=True)
 
     @staticmethod
     def _kernel() -> Any:
@@ -177,6 +182,10 @@ class RobustEskf(AttitudeEstimator):
         p[_m.P_REALIGN] = 0.0  # over a gap the filter keeps what it knows
         for name in _POSITIVE + _NOT_NEGATIVE:
             p[getattr(layout, f"P_{name.upper()}")] = getattr(self, name)
+        timing = self.timing_std
+        if timing is None:
+            timing = _TIMING_DECLARED if self.latency > 0.0 else _TIMING_UNKNOWN
+        p[layout.P_TIMING_STD] = timing
         return p
 
     def _memory(self) -> tuple[FloatArray, FloatArray]:
@@ -232,4 +241,5 @@ class RobustEskf(AttitudeEstimator):
         correction = np.empty((int(count), smoother.CORRECTION_SIZE))
         smoother.backward(records, count, np.empty((N + 2, N)), np.empty(INTERVAL), correction)
         smoother.apply(imu.t, imu.gyr, p, records, ends, count, correction, out)
+        smoother.level_back(imu.t, gyr, records, ends, count, out)
         return replace(self._solution(rec, imu.t, out, {}), causal=False)

@@ -6,7 +6,7 @@ one scalar at a time: the velocity, which stays bounded; at rest the rates, whic
 gyro's bias; and the direction of the horizontal magnetic field.
 """
 
-from math import cos, inf, isinf, sin, sqrt
+from math import inf, isinf, sqrt
 
 from strapdown.kernels import status as s
 from strapdown.kernels._jit import Mat, Vec, kernel
@@ -34,7 +34,7 @@ from strapdown.kernels.memory import (
     set_status,
     store,
 )
-from strapdown.kernels.quat import dcm, exp, from_two_vectors, log, mul, normalize, rotate
+from strapdown.kernels.quat import dcm, exp, mul
 from strapdown.kernels.robust_eskf_covariance import (
     C_DT,
     DV,
@@ -45,7 +45,6 @@ from strapdown.kernels.robust_eskf_covariance import (
     PHI,
     TAU,
     THETA,
-    VEL,
     N,
     forget,
 )
@@ -61,6 +60,7 @@ from strapdown.kernels.robust_eskf_layout import (
     HAS_HELD,
     LARGEST,
     LAST_GYR,
+    LEVEL_LEFT,
     MG,
     OPEN,
     P_ACC_BIAS_STD,
@@ -75,60 +75,20 @@ from strapdown.kernels.robust_eskf_layout import (
     P_REST_ACC,
     P_REST_GYR,
     P_TIMING_STD,
-    P_VELOCITY_STD,
     QUIET,
-    R_RESET,
-    R_RESET_T,
-    R_TURN,
     REPEATED,
     STARTED,
     USUAL,
 )
 from strapdown.kernels.robust_eskf_layout import W_SIZE as W_SIZE
-from strapdown.kernels.robust_eskf_update import LOW_PASS, clear, close_interval
+from strapdown.kernels.robust_eskf_level import level_anew, level_on, start, turn_to_first_field
+from strapdown.kernels.robust_eskf_update import LOW_PASS, close_interval
 
 MIN_RATE = 0.035  # a mean rate below 2 deg/s may be rest [rad/s]
-TILT_STD = 0.1  # of an attitude levelled from one sample [rad]
-HEADING_STD = 0.3  # of a heading from one sample of the field [rad]
 LOST = 10.0  # deviations of the mean velocity that no motion explains
 CLIPPED_RATE = 0.5  # the largest rate so far, if above this [rad/s] and ...
 CLIPPED_COUNT = 3.0  # ... repeated so often to the last bit, is the end of the range
 CLIPPED_TIME = 0.25  # how long an unseen rate lasts [s]
-
-
-@kernel
-def _forget_motion(x: Vec, P: Mat, p: Vec, w: Vec, ax: float, ay: float, az: float) -> None:
-    """Velocity and tilt are unknown again; the open interval is dropped."""
-    excess = sqrt(ax * ax + ay * ay + az * az) / p[P_GRAVITY] - 1.0
-    for i in range(3):
-        forget(P, PHI + i, TILT_STD * TILT_STD + excess * excess)
-        forget(P, VEL + i, p[P_VELOCITY_STD] * p[P_VELOCITY_STD])
-        x[V + i] = 0.0
-        x[DRIFT + i] = 0.0
-    x[QUIET] = 0.0
-    clear(x)
-    w[R_RESET] = 1.0
-    w[R_RESET_T] = x[T]
-
-
-# fmt: off
-@kernel
-def _level(
-    x: Vec, P: Mat, p: Vec, w: Vec, has_acc: bool, ax: float, ay: float, az: float
-) -> None:
-    """Turn the attitude the short way until the specific force, if any, points up."""
-    # fmt: on
-    heading = P[PHI + 2, PHI + 2]
-    if has_acc:
-        q0, q1, q2, q3 = x[ATT], x[ATT + 1], x[ATT + 2], x[ATT + 3]
-        fx, fy, fz = rotate(q0, q1, q2, q3, ax, ay, az)
-        c0, c1, c2, c3 = from_two_vectors(fx, fy, fz, 0.0, 0.0, -1.0)
-        q0, q1, q2, q3 = mul(c0, c1, c2, c3, q0, q1, q2, q3)
-        x[ATT], x[ATT + 1], x[ATT + 2], x[ATT + 3] = normalize(q0, q1, q2, q3)
-        _forget_motion(x, P, p, w, ax, ay, az)
-    else:
-        _forget_motion(x, P, p, w, 0.0, 0.0, 0.0)
-    P[PHI + 2, PHI + 2] = heading
 
 
 @kernel
@@ -138,8 +98,6 @@ def init(x: Vec, P: Mat, p: Vec) -> None:
         for j in range(N):
             P[i, j] = 0.0
     for i in range(3):
-        P[PHI + i, PHI + i] = TILT_STD * TILT_STD
-        P[VEL + i, VEL + i] = p[P_VELOCITY_STD] * p[P_VELOCITY_STD]
         P[EBG + i, EBG + i] = p[P_GYR_BIAS_STD] * p[P_GYR_BIAS_STD]
         P[EBA + i, EBA + i] = p[P_ACC_BIAS_STD] * p[P_ACC_BIAS_STD]
         x[STD_BG + i] = p[P_GYR_BIAS_STD]
@@ -147,40 +105,6 @@ def init(x: Vec, P: Mat, p: Vec) -> None:
     for i in range(9):
         P[EMG + i, EMG + i] = p[P_GYR_SCALE_STD] * p[P_GYR_SCALE_STD]
     P[LAG, LAG] = p[P_MAG_DELAY_STD] * p[P_MAG_DELAY_STD]
-
-
-# fmt: off
-@kernel
-def _begin_interval(
-    x: Vec, P: Mat, p: Vec, w: Vec, has_acc: bool, has_mag: bool,
-    gx: float, gy: float, gz: float, ax: float, ay: float, az: float,
-) -> None:
-    """Take over the attitude that `begin` has just found, with its uncertainty."""
-    # fmt: on
-    q0, q1, q2, q3 = x[Q], x[Q + 1], x[Q + 2], x[Q + 3]
-    if x[STARTED] == 0.0:
-        x[STARTED] = 1.0
-        if has_acc:
-            _forget_motion(x, P, p, w, ax, ay, az)
-        else:
-            _forget_motion(x, P, p, w, 0.0, 0.0, p[P_GRAVITY])
-        heading = HEADING_STD if has_mag else 0.0  # without a field heading is arbitrary
-        P[PHI + 2, PHI + 2] = heading * heading
-        x[GYR_MEAN], x[GYR_MEAN + 1], x[GYR_MEAN + 2] = gx, gy, gz
-        x[ACC_MEAN], x[ACC_MEAN + 1], x[ACC_MEAN + 2] = ax, ay, az
-    else:  # the first field came: the picture so far turns about down
-        c0, c1, c2, c3 = mul(q0, q1, q2, q3, x[ATT], -x[ATT + 1], -x[ATT + 2], -x[ATT + 3])
-        c1, c2, c3 = log(c0, c1, c2, c3)
-        x[V], x[V + 1] = (
-            cos(c3) * x[V] - sin(c3) * x[V + 1],
-            sin(c3) * x[V] + cos(c3) * x[V + 1],
-        )
-        forget(P, PHI + 2, HEADING_STD * HEADING_STD)
-        clear(x)
-        w[R_RESET] = max(2.0, w[R_RESET])
-        w[R_RESET_T] = x[T]
-        w[R_TURN] += c3
-    x[ATT], x[ATT + 1], x[ATT + 2], x[ATT + 3] = q0, q1, q2, q3
 
 
 @kernel
@@ -284,15 +208,19 @@ def step(
     else:
         ax, ay, az = x[ACC_HELD], x[ACC_HELD + 1], x[ACC_HELD + 2]
     if x[STARTED] == 0.0:
-        _begin_interval(x, P, p, w, has_acc, has_mag, gx, gy, gz, ax, ay, az)
+        start(x, P, p, w, has_acc, has_mag, ax, ay, az)
+        x[GYR_MEAN], x[GYR_MEAN + 1], x[GYR_MEAN + 2] = gx, gy, gz
+        x[ACC_MEAN], x[ACC_MEAN + 1], x[ACC_MEAN + 2] = ax, ay, az
         before = t
         dt = 0.0
     elif todo == START:
-        _begin_interval(x, P, p, w, has_acc, has_mag, gx, gy, gz, ax, ay, az)
+        turn_to_first_field(x, P, w)
     if todo == WIDEN:
-        _level(x, P, p, w, has_acc, ax, ay, az)
+        level_anew(x, P, p, w, has_acc, ax, ay, az)
         k = p[P_RATE_WALK]
-        P[PHI + 2, PHI + 2] = min(1.0, P[PHI + 2, PHI + 2] + k * k * dt * dt * dt / 12.0)
+        P[PHI + 2, PHI + 2] += k * k * dt * dt * dt / 12.0
+        if P[PHI + 2, PHI + 2] > 1.0:
+            forget(P, PHI + 2, 1.0)
         dt = 0.0
 
     # attitude: scale and misalignment are those of the rate less its bias
@@ -362,11 +290,13 @@ def step(
         x[FIELD + 5] += 1.0
 
     _note_rest(x, p, t - before, gx, gy, gz, has_acc, ax, ay, az)
-    if x[OPEN + TAU] >= p[P_INTERVAL]:
+    if x[OPEN + TAU] >= p[P_INTERVAL] and x[LEVEL_LEFT] > 0.0:
+        level_on(x, P, p, w)
+    elif x[OPEN + TAU] >= p[P_INTERVAL]:
         close_interval(x, P, p, w)
         k = x[DRIFT] * x[DRIFT] + x[DRIFT + 1] * x[DRIFT + 1] + x[DRIFT + 2] * x[DRIFT + 2]
         if k > LOST * LOST and has_acc:
-            _level(x, P, p, w, True, ax, ay, az)
+            level_anew(x, P, p, w, True, ax, ay, az)
     set_status(x, int(x[FLAGS]))
     _publish(x, P, p, omega_n, omega_e, dx, dy, dz)
 

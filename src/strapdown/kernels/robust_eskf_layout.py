@@ -50,7 +50,9 @@ LARGEST = ASTRAY + 1  # rate of largest magnitude so far, one axis [rad/s]
 REPEATED = LARGEST + 1  # how often the largest component has repeated to the last bit
 LAST_GYR = REPEATED + 1  # last sample: 3
 STARTED = LAST_GYR + 3
-X_SIZE = STARTED + 1
+LEVEL_LEFT = STARTED + 1  # how long the level is still sought [s]
+LEVEL_DV = LEVEL_LEFT + 1  # specific force summed up meanwhile, n [m/s]: 3
+X_SIZE = LEVEL_DV + 3
 
 # --- w: scratch, and the record of a closed interval that the smoother reads ---------------------
 ERROR = W_HEAD  # error state of the open update
@@ -59,9 +61,10 @@ RECORD = SCRATCH + 12 * N
 R_CLOSED = RECORD  # 1 when this sample closed an interval
 R_RESET = RECORD + 1  # 1 if attitude and velocity were forgotten in it, 2 if heading was
 R_RESET_T = RECORD + 2  # and when
-R_TURN = RECORD + 3  # turn about down at that reset
-R_COUNT = RECORD + 4  # measurements
-R_STEP = RECORD + 5  # corrections of attitude and gyro bias
+R_LEVEL_T = RECORD + 3  # and when the level was found again
+R_TURN = RECORD + 4  # turn about down at that reset
+R_COUNT = RECORD + 5  # measurements
+R_STEP = RECORD + 6  # corrections of attitude and gyro bias
 R_SUMS = R_STEP + 6
 R_ROWS = R_SUMS + INTERVAL  # rows of attitude and gyro bias of P after the updates
 R_MEASURED = R_ROWS + 6 * N  # each: element, h_lag, innovation, its variance, g

@@ -39,6 +39,7 @@ from strapdown.kernels.robust_eskf_layout import (
     P_TIMING_STD,
     R_CLOSED,
     R_COUNT,
+    R_LEVEL_T,
     R_MEASURED,
     R_RESET,
     R_RESET_T,
@@ -245,3 +246,39 @@ def apply(
             out[k, STD_ATT - base] = sqrt(b * b + a * a * rx * rx)
             b = out[k, STD_ATT - base + 1]
             out[k, STD_ATT - base + 1] = sqrt(b * b + a * a * ry * ry)
+
+
+@kernel
+def level_back(t: Vec, gyr: Mat, records: Mat, ends: IntVec, count: int, out: Mat) -> None:
+    """Turn the attitude back from where a level was found to where it began to be sought.
+
+    In between the filter only levels; the gyroscope links these samples to what came of it.
+    """
+    j = Q - STATUS
+    first = 0
+    for n in range(count):
+        if records[n, R_RESET - RECORD] == 1.0:
+            k = ends[n]
+            while k > first and t[k] > records[n, R_LEVEL_T - RECORD]:
+                k -= 1
+            wx, wy, wz = 0.0, 0.0, 0.0
+            while k > first and t[k - 1] >= records[n, R_RESET_T - RECORD]:
+                if int(out[k - 1, 0]) & s.ALIGNING:
+                    break
+                x, y, z = gyr[k, 0], gyr[k, 1], gyr[k, 2]
+                if x * x + y * y + z * z < inf:  # else that of the sample after is held
+                    wx = x - out[k, BG - STATUS]
+                    wy = y - out[k, BG - STATUS + 1]
+                    wz = z - out[k, BG - STATUS + 2]
+                dt = t[k - 1] - t[k]
+                e0, e1, e2, e3 = exp(dt * wx, dt * wy, dt * wz)
+                q0, q1, q2, q3 = out[k, j], out[k, j + 1], out[k, j + 2], out[k, j + 3]
+                q0, q1, q2, q3 = mul(q0, q1, q2, q3, e0, e1, e2, e3)
+                q0, q1, q2, q3 = normalize(q0, q1, q2, q3)
+                k -= 1
+                out[k, j], out[k, j + 1], out[k, j + 2], out[k, j + 3] = q0, q1, q2, q3
+                for i in range(STD_ATT - STATUS, STD_BG - STATUS + 3):
+                    out[k, i] = out[k + 1, i]
+                for i in range(BG - STATUS, BG - STATUS + 3):
+                    out[k, i] = out[k + 1, i]
+        first = ends[n]

@@ -205,7 +205,7 @@ def _heading(x: Vec, P: Mat, p: Vec, w: Vec) -> int:
 
 
 @kernel
-def _add_noise(x: Vec, P: Mat, p: Vec) -> None:
+def add_noise(x: Vec, P: Mat, p: Vec) -> None:
     """Process noise of the interval."""
     tau = x[OPEN + TAU]
     tx, ty, tz = x[OPEN + THETA], x[OPEN + THETA + 1], x[OPEN + THETA + 2]
@@ -234,7 +234,7 @@ def close_interval(x: Vec, P: Mat, p: Vec, w: Vec) -> None:
     for i in range(INTERVAL):
         w[R_SUMS + i] = x[OPEN + i]
     propagate(P, x, OPEN, w, SCRATCH)
-    _add_noise(x, P, p)
+    add_noise(x, P, p)
     for i in range(N):
         w[ERROR + i] = 0.0
     w[R_COUNT] = 0.0

@@ -11,7 +11,7 @@ from strapdown import _checks
 from strapdown._types import FloatArray
 from strapdown.attitude.adaptive_ekf import _PRINTED as _PRINTED_ATTITUDE
 from strapdown.attitude.adaptive_ekf import AdaptiveEkf
-from strapdown.estimator import Taken, register
+from strapdown.estimator import State, Taken, Tracker, register
 from strapdown.kernels import memory as _m
 
 
@@ -156,6 +156,22 @@ class Gnssins(AdaptiveEkf):
         Gnssins
         """
         return cls(**{**_PRINTED_ATTITUDE, **_PRINTED, **parameters})
+
+    def tracker(self, state: State | None = None) -> Tracker:
+        """Return the stateful form for real-time code, which takes late fixes too.
+
+        Parameters
+        ----------
+        state : State, optional
+            Where to begin.
+
+        Returns
+        -------
+        strapdown.navigation.NavigationTracker
+        """
+        from strapdown.navigation.tracker import NavigationTracker
+
+        return NavigationTracker(self, state)
 
     def _params(self) -> FloatArray:
         from strapdown.kernels.gnssins import layout as k

@@ -1,7 +1,7 @@
 """Real-time form of a navigation filter: sample by sample, with fixes that come late."""
 
 from bisect import bisect_left
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,7 +12,7 @@ from strapdown.estimator import State, Tracker
 from strapdown.kernels import memory as _m
 
 if TYPE_CHECKING:
-    from strapdown.navigation.loosely_coupled import LooselyCoupled
+    from strapdown.estimator import Estimator
 
 _EVERY = 0.5  # between two snapshots [s]
 
@@ -20,15 +20,15 @@ _EVERY = 0.5  # between two snapshots [s]
 class _Sample:
     """One IMU sample and the aiding that takes effect at it, in order of time."""
 
-    __slots__ = ("acc", "aiding", "gyr", "t")
+    __slots__ = ("acc", "aiding", "gyr", "mag", "t")
 
-    def __init__(self, t: float, gyr: FloatArray, acc: FloatArray) -> None:
-        self.t, self.gyr, self.acc = t, gyr, acc
+    def __init__(self, t: float, gyr: FloatArray, acc: FloatArray, mag: FloatArray) -> None:
+        self.t, self.gyr, self.acc, self.mag = t, gyr, acc, mag
         self.aiding: list[tuple[float, int, FloatArray]] = []
 
 
 class NavigationTracker(Tracker):
-    """The stateful form of `LooselyCoupled`: IMU samples and aiding, the latter late if need be.
+    """The stateful form of navigation filters: IMU samples and aiding, late if need be.
 
     Aiding that is older than the last IMU sample goes to the sample where it belonged: the
     filter steps back to a snapshot before it and repeats the samples since. The result is that
@@ -36,7 +36,7 @@ class NavigationTracker(Tracker):
 
     Parameters
     ----------
-    estimator : LooselyCoupled
+    estimator : Estimator
         Whose parameters and kernel it uses.
     state : State, optional
         Where to begin; knows nothing by default.
@@ -47,7 +47,7 @@ class NavigationTracker(Tracker):
     __slots__ = ("_pending", "_samples", "_snapshots", "dropped", "history")
 
     def __init__(
-        self, estimator: "LooselyCoupled", state: State | None = None, history: float = 3.0
+        self, estimator: "Estimator", state: State | None = None, history: float = 3.0
     ) -> None:
         super().__init__(estimator, state)
         self.history = _checks.positive("history", history, allow_zero=True)
@@ -117,7 +117,7 @@ class NavigationTracker(Tracker):
         acc : array_like, shape (3,), or None
             Specific force [m/s^2]; None where a slower accelerometer has no new sample.
         mag : array_like, shape (3,), optional
-            Not used by this filter.
+            Field [T], if there is a new one and the filter uses it.
 
         Raises
         ------
@@ -135,6 +135,7 @@ class NavigationTracker(Tracker):
             np.full(3, np.inf)
             if acc is None
             else _checks.as_vector("acc", acc, allow_nan=True).copy(),
+            _NO_FIELD if mag is None else _checks.as_vector("mag", mag, allow_nan=True).copy(),
         )
         self._pending.sort(key=lambda item: item[0])
         while self._pending and self._pending[0][0] <= t:
@@ -195,8 +196,9 @@ class NavigationTracker(Tracker):
         for _, cell, values in sample.aiding:
             self._x[cell] = 1.0
             self._x[cell + 1 : cell + 1 + len(values)] = values
-        nothing: Any = _NO_FIELD
-        self._update(self._x, self._P, self._p, self._w, sample.t, sample.gyr, sample.acc, nothing)
+        self._update(
+            self._x, self._P, self._p, self._w, sample.t, sample.gyr, sample.acc, sample.mag
+        )
 
     def _forget(self, t: float) -> None:
         """Drop history that no late aiding can need."""

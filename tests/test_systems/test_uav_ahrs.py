@@ -13,7 +13,7 @@ from strapdown.systems import Verdict
 from strapdown.systems.uav import equations, flight, programs
 from strapdown.units import DEG, GAUSS
 
-PARTS = ("equations", "ahrs", "outages", "slow-biases", "tight")
+PARTS = ("equations", "ahrs", "outages", "slow-biases", "tight", "ins")
 TABLES = [
     ("equations", "3.2.1, rank of the observability matrix", 6),
     ("equations", "A.1", 6),
@@ -31,6 +31,9 @@ TABLES = [
     ("slow-biases", "S6, S7", 20),
     ("slow-biases", "S9", 20),
     ("tight", "S8", 21),
+    ("ins", "4.1", 8),
+    ("ins", "appendix B", 1),
+    ("ins", "(1.2)", 1),
 ]
 ALWAYS = {
     "equations": set(),
@@ -45,6 +48,7 @@ ALWAYS = {
     },
     "slow-biases": set(),
     "tight": set(),
+    "ins": set(),
 }  # fmt: skip
 
 
@@ -69,7 +73,7 @@ def test_rows_are_json(part):
     for row in rows("uav", part).values():
         json.dumps(row.summary(), allow_nan=False)
     assert len(shown("uav", part).blocks) == {
-        "equations": 0, "ahrs": 2, "outages": 2, "slow-biases": 4, "tight": 1,
+        "equations": 0, "ahrs": 2, "outages": 2, "slow-biases": 4, "tight": 1, "ins": 1,
     }[part]  # fmt: skip
 
 
@@ -82,6 +86,14 @@ def test_multi_mode_stays_below_one_degree_and_improves_by_half():
         assert row.here < 1.0
     for kind in ("corrected", "as printed"):
         assert found[f"S3, 4.2.1, {kind}, improvement, mean of the three angles"].here > 50.0
+
+
+def test_ins_keeps_the_aircraft_within_what_its_fixes_allow():
+    found = rows("uav", "ins")
+    for axis, limit in (("north", 0.5), ("east", 0.5), ("down", 1.0)):
+        assert found[f"4.1, GPS always valid, position {axis}, RMS after 30 s"].here < limit
+    track = found["(1.2), track of 2.7 km integrated from the flown velocity, largest error"]
+    assert track.here < 0.001
 
 
 # --- flights ----------------------------------------------------------------------------

@@ -174,10 +174,10 @@ class MultiModeAhrs(UavAhrs):
         return multi_mode_ahrs
 
     def _params(self) -> FloatArray:
+        from strapdown.kernels import multi_mode_ahrs as kernel
         from strapdown.kernels import uav_ahrs as k
 
-        kernel = self._kernel()
-        p = self._shared(kernel.P_SIZE, k.DIAGONAL)
+        p = self._shared(self._kernel().P_SIZE, k.DIAGONAL)
         p[k.P_BIAS_NOISE : k.P_BIAS_NOISE + 3] = self.gyr_bias_noise
         p[k.P_MAG_NOISE] = self.mag_noise
         p[k.P_MAG_PERIOD] = 1.0 / self.mag_rate
@@ -188,8 +188,9 @@ class MultiModeAhrs(UavAhrs):
         return p
 
     def _memory(self) -> tuple[FloatArray, FloatArray]:
+        from strapdown.kernels import multi_mode_ahrs as k
+
         x, P = UavAhrs._memory(self)
-        k = self._kernel()
         x[k.T_MAG] = x[k.T_COURSE] = -math.inf
         if self.mag_reference is not None:
             x[k.REF_H], x[k.REF_D] = self.mag_reference

@@ -12,6 +12,7 @@ from strapdown.navigation.mechanisation import (
     mechanise_plane,
 )
 from strapdown.navigation.tracker import NavigationTracker
+from strapdown.navigation.uav_ins import UavIns
 
 __all__ = [
     "DeadReckoning",
@@ -21,6 +22,7 @@ __all__ = [
     "NavigationTracker",
     "SphericalEarth",
     "Start",
+    "UavIns",
     "alignment",
     "error_growth",
     "grades",

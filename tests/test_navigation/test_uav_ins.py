@@ -222,6 +222,22 @@ def test_pieces_prefix_and_steps_give_the_bits_of_run(circuit):
     np.testing.assert_array_equal(state.x[m.STD_BA : m.STD_BA + 3], whole.std_acc_bias[799])
 
 
+def test_tracker_takes_late_fixes_and_gives_the_bits_of_run(circuit):
+    flt, rec, _ = circuit
+    rec = rec.between(0.0, 20.0)
+    whole, fixes = flt.run(rec), rec.gnss
+    trk, j = flt.tracker(), 0
+    for i, t in enumerate(rec.imu.t):
+        while j < len(fixes) and min(fixes.t[j] + 0.31, rec.imu.t[-1]) <= t:
+            trk.add_gnss(fixes.t[j], fixes.lla[j], fixes.v_n[j], fixes.std_position_n[j],
+                         fixes.std_velocity_n[j])  # fmt: skip
+            j += 1
+        trk.update(t, rec.imu.gyr[i], rec.imu.acc[i], rec.mag.mag[i])
+    np.testing.assert_array_equal(trk.q_nb, whole.q_nb[-1])
+    np.testing.assert_array_equal(trk.lla, whole.lla[-1])
+    np.testing.assert_array_equal(trk.v_n, whole.v_n[-1])
+
+
 def test_bad_samples_and_gaps_leave_all_finite_and_it_comes_back(circuit):
     flt, rec, truth = circuit
     gyr, acc, mag = rec.imu.gyr.copy(), rec.imu.acc.copy(), rec.mag.mag.copy()

@@ -9,7 +9,7 @@ import numpy as np
 from strapdown import _checks
 from strapdown._types import FloatArray
 from strapdown.attitude.multi_mode_ahrs import MultiModeAhrs
-from strapdown.estimator import Taken, register
+from strapdown.estimator import State, Taken, Tracker, register
 from strapdown.kernels import memory as _m
 from strapdown.recording import Recording
 
@@ -102,6 +102,22 @@ class UavIns(MultiModeAhrs):
         for name in ("acc_bias_walk", "std_acc_bias", "tilt_time"):
             _checks.positive(name, getattr(self, name), allow_zero=True)
         self._positive_or_infinite("fix_gate")
+
+    def tracker(self, state: State | None = None) -> Tracker:
+        """Return the stateful form for real-time code, which takes late fixes too.
+
+        Parameters
+        ----------
+        state : State, optional
+            Where to begin.
+
+        Returns
+        -------
+        strapdown.navigation.NavigationTracker
+        """
+        from strapdown.navigation.tracker import NavigationTracker
+
+        return NavigationTracker(self, state)
 
     @staticmethod
     def _kernel() -> Any:

@@ -75,12 +75,14 @@ def limit_rows(item: str, off: FloatArray, flown: Log, remark: str) -> list[Row]
 
     Parameters
     ----------
-    item, remark : str
-        Of the rows.
+    item : str
+        What stands before each angle.
     off : ndarray, shape (n, 3)
         Errors [deg].
     flown : Log
         The flight.
+    remark : str
+        Of the rows.
 
     Returns
     -------

@@ -625,15 +625,29 @@ def test_wrap_is_within_half_a_turn(angle):
     assert k.wrap(angle) == pytest.approx(np.angle(np.exp(1j * angle)), abs=1e-14)
 
 
-def test_gate_bounds_the_pull():
-    """An innovation of any size beyond the gate moves the state by the same."""
+def test_gate_bounds_the_pull_of_field_and_course_but_not_of_gravity():
+    """A course far off moves the state no more than one at the gate; a force has no gate."""
     found = []
-    for size in (50.0, 5000.0):
-        flt = StandardAhrs(gate=3.0)
-        x, P = start(flt, [1.0, 0, 0, 0])
+    for yaw in (0.5, 2.5):
+        flt, x, P = flying(gate=3.0)
         P[:] = seven(1e-4 * np.eye(6), quat(x))
-        w = feed(flt, x, P, 0.04, np.zeros(3), [size, 0.0, -G])
-        assert w[m.D_ACC + 6] == s.REJECTED_GATE
-        assert int(x[m.STATUS]) & s.ACC_REJECTED
+        fix(x, 0.02, 9.0 * np.cos(yaw), 9.0 * np.sin(yaw))
+        w = feed(flt, x, P, 0.02, np.zeros(3), NO_ACC)
+        assert w[mm.W_COURSE + 6] == s.REJECTED_GATE
+        assert int(x[m.STATUS]) & s.AIDING_REJECTED
         found.append(rotation(quat(x)).magnitude())
-    assert found[1] < 0.02 * found[0] * 1.5
+    assert 0.0 < found[1] < found[0]
+    for bad, flag, sensor in (
+        ([2.4e-5, 3e-5, 3.9e-5], s.MAG_REJECTED, m.D_MAG),
+        (np.empty(0), 0, m.D_ACC),
+    ):
+        flt, x, P = flying(gate=3.0, reject_disturbed=False)
+        P[:] = seven(1e-4 * np.eye(6), quat(x))
+        w = feed(flt, x, P, 0.04, np.zeros(3), [50.0, 0.0, -G], bad)
+        assert w[sensor + 6] == (s.REJECTED_GATE if flag else s.ACCEPTED)
+        assert int(x[m.STATUS]) & s.MAG_REJECTED == flag
+    flt = StandardAhrs(gate=3.0)
+    x, P = start(flt, [1.0, 0, 0, 0])
+    P[:] = seven(1e-4 * np.eye(6), quat(x))
+    w = feed(flt, x, P, 0.02, np.zeros(3), NO_ACC, [-2.4e-5, 0.0, 3.9e-5])
+    assert w[m.D_MAG + 6] == s.REJECTED_GATE

@@ -43,8 +43,9 @@ class UavAhrs(AttitudeEstimator):
     std_gyr_bias : float
         Standard deviation of the first bias [rad/s].
     gate : float
-        Innovations beyond so many sigma are weighted down. Infinite, as in the source, switches
-        it off.
+        Innovations of field and course beyond so many sigma are weighted down. Infinite, as in
+        the source, switches it off. The accelerometer has none: what motion adds is in its noise,
+        and a gate would take a large error of the filter for one of the sensor.
     gap_rate : float
         Rate that may have gone unseen in a gap or beyond the gyro's range [rad/s]. A gap in which
         it hides more than `std_tilt` levels again, and takes the heading from what comes next.

@@ -196,8 +196,7 @@ def correct(
             r = variance_of(x, p[P_ACC_NOISE], p[P_ACC_PERIOD])
             g = p[P_GRAVITY]
             # at rest f_b points up: (3.16) with the sign of the program
-            if not update_vector(x, P, w, D_ACC, 0.0, 0.0, -g, ax, ay, az, r, p[P_GATE]):
-                set_status(x, s.ACC_REJECTED)
+            update_vector(x, P, w, D_ACC, 0.0, 0.0, -g, ax, ay, az, r, inf)
         wind(x, SINCE_ACC, p[P_ACC_PERIOD])
     if anything:
         inject(x, P, p, w)

@@ -167,10 +167,7 @@ def step(
                 r = variance_of(x, p[P_ACC_NOISE], p[P_ACC_PERIOD])
                 g = p[P_GRAVITY]
                 # at rest f_b points up: (2.33) with the sign of the program
-                if not update_vector(
-                    x, P, w, D_ACC, 0.0, 0.0, -g, ax, ay, az, r, p[P_GATE]
-                ):
-                    set_status(x, s.ACC_REJECTED)
+                update_vector(x, P, w, D_ACC, 0.0, 0.0, -g, ax, ay, az, r, inf)
                 inject(x, P, p, w)
                 wind(x, SINCE_ACC, p[P_ACC_PERIOD])
             if has_mag and x[ALIGNED] != TILT and due(x, SINCE_MAG, p[P_MAG_PERIOD], dt):

@@ -1,15 +1,17 @@
 """The robust error-state filter and its smoother on motions that SciPy makes."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
+from scipy.stats import chi2
 from truth import faults, hand
 
 import strapdown as sd
 from strapdown.attitude import RobustEskf
-from strapdown.kernels import memory, robust_eskf_layout
+from strapdown.kernels import memory, robust_eskf, robust_eskf_layout
 from strapdown.recording import Imu, Mag, Recording
 from strapdown.units import DEG, DPS, UT
 
@@ -477,9 +479,16 @@ def matched(seed, flt):
     return log(t, gyr, acc), r_nb, bias
 
 
-@pytest.mark.slow
-def test_errors_are_as_large_as_stated_over_many_seeds():
-    """NEES of tilt and of the bias; 120 draws from the model, Gaussian tails, true prior."""
+MATCHED_RUNS = 120
+
+
+@cache
+def studied():
+    """Draws from the model, Gaussian tails, true prior: tilt, bias, and what entered.
+
+    Intervals of ten samples each, to the sample, as they are drawn: the velocity is what it is at
+    their ends.
+    """
     flt = RobustEskf(
         gravity=hand.G,
         gyr_bias_std=0.01,
@@ -487,17 +496,55 @@ def test_errors_are_as_large_as_stated_over_many_seeds():
         tails=1e9,
         timing_std=0.0,
         rest_time=1e9,
+        interval=0.1 - 1e-9,
     )
-    runs, tilt, bias = 120, [], []
-    for seed in range(runs):
+    tilt, bias, entered = [], [], []
+    for seed in range(MATCHED_RUNS):
         rec, r_nb, b = matched(seed, flt)
         sol = flt.run(rec)
         z = hand.rotvec_off(sol.q_nb[-1:], r_nb[-1:])[0, :2] / sol.std_attitude_n[-1, :2]
         tilt.append(np.sum(z**2))
         bias.append(np.sum(((b[-1] - sol.gyr_bias[-1]) / sol.std_gyr_bias[-1])[:2] ** 2))
+        rows = sol.diagnostics["acc"]
+        # The first two seconds are levelled by velocities within their bound; drawn are those of
+        # single looks, ten times the variance, and it takes as long again to forget.
+        late = rows.t > 4.0
+        entered.append((rows.innovation[late] / rows.sigma[late]).ravel())
+    return tilt, bias, np.concatenate(entered)
+
+
+def test_errors_are_as_large_as_stated_over_many_seeds():
+    """NEES of tilt and of the bias."""
+    tilt, bias, _ = studied()
     # mean of 120 chi-square variables of 2 degrees: deviation sqrt(4 / 120); 99 %: 2.6 of it
     for name, values in (("tilt", tilt), ("bias", bias)):
-        assert abs(np.mean(values) - 2.0) < 2.6 * np.sqrt(4.0 / runs), (name, np.mean(values))
+        assert abs(np.mean(values) - 2.0) < 2.6 * np.sqrt(4.0 / MATCHED_RUNS), (name, values)
+
+
+def test_innovations_are_as_large_as_stated_over_many_seeds():
+    """NIS of the velocities: each is what is left after the scalars before it."""
+    _, _, z = studied()
+    low, high = chi2.ppf([0.005, 0.995], len(z))
+    print(f"NIS {z @ z / len(z):.4f}, within {low / len(z):.4f} to {high / len(z):.4f}")
+    assert low < z @ z < high
+
+
+def test_velocities_in_the_diagnostics_are_the_innovations_that_enter():
+    """One after the other; the first moves the second's prediction, where both are correlated."""
+    rec, _, _ = noisy(duration=8.0, rest=0.0)
+    flt = RobustEskf(gravity=hand.G, tails=1e9, rest_time=1e9)
+    state, p, w = flt.init(), flt._params(), np.zeros(robust_eskf_layout.W_SIZE)
+    x, P, first, count = state.x.copy(), state.P.copy(), robust_eskf_layout.R_MEASURED, 0
+    for t, gyr, acc in zip(rec.imu.t.tolist(), rec.imu.gyr, rec.imu.acc, strict=True):
+        w[robust_eskf_layout.R_CLOSED] = 0.0
+        robust_eskf.update(x, P, p, w, t, gyr, acc, np.empty(0))
+        if w[robust_eskf_layout.R_CLOSED] > 0.0:
+            rows = w[first : first + 3 * robust_eskf_layout.MEASURED].reshape(3, -1)
+            noted = w[memory.D_ACC : memory.D_ACC + 6]
+            np.testing.assert_allclose(noted[:3], rows[:, 2], rtol=1e-12)
+            np.testing.assert_allclose(noted[3:] ** 2, rows[:, 3], rtol=1e-9)
+            count += 1
+    assert count > 40
 
 
 # --- messages ------------------------------------------------------------------------------------

@@ -132,7 +132,7 @@ def _velocity(x: Vec, P: Mat, p: Vec, w: Vec, rest: bool) -> None:
         if not rest:  # one look per interval at something that changes over `velocity_time`
             r = bound * max(1.0, 2.0 * p[P_VELOCITY_TIME] / tau)
             r *= heavy_tail(p[P_TAILS], v * v / expected)
-        note_sigma(w, D_ACC, i, -v, P[VEL + i, VEL + i] + r)
+        note_sigma(w, D_ACC, i, -v - w[ERROR + VEL + i], P[VEL + i, VEL + i] + r)
         _measure(P, w, VEL + i, 0.0, -v, r)
     w[D_ACC + 6] = s.ACCEPTED
 

@@ -4,6 +4,7 @@ import os
 import statistics
 import subprocess
 import sys
+from functools import partial
 
 import imufusion
 import numpy as np
@@ -55,6 +56,28 @@ def test_run_of_every_estimator_stays_below_6_us(name, recording, take_turns, ta
     assert times["here"] / n < 6e-6
 
 
+ALIKE = {
+    "two-stage": {},
+    "indirect-ekf": {"propagation": "truncated"},
+    "standard-ahrs": {},
+    "multi-mode-ahrs": {},
+}
+
+
+def test_filters_of_the_theses_are_within_twice_each_other(recording, take_turns, table):
+    flts = {name: sd.estimators.create(name, **p) for name, p in ALIKE.items()}
+    times = take_turns(**{name: partial(flt.run, recording) for name, flt in flts.items()})
+    each = sorted((took, name) for name, took in times.items())
+    ratio, n = each[-1][0] / each[0][0], len(recording.imu)
+    table(
+        "slowest of two-stage, truncated indirect-ekf and both AHRS over the quickest",
+        f"{ratio:.2f} times",
+        ", ".join(f"{name} {ns(took, n)}" for took, name in each),
+        "2 times",
+    )
+    assert ratio <= 2.0
+
+
 @pytest.mark.parametrize("name", ["madgwick", "mekf"])
 def test_tracker_from_python(name, recording, take_turns, table):
     imu, field = recording.imu, recording.mag.mag
@@ -88,8 +111,26 @@ def test_tracker_from_python(name, recording, take_turns, table):
         assert ratio <= 2.0
 
 
-@pytest.mark.parametrize("name", ["madgwick", "mekf"])
-def test_pure_step_from_python(name, recording, take_turns, table):
+def test_tracker_of_the_robust_filter_from_python(recording, take_turns, table):
+    rows = list(
+        zip(
+            recording.imu.t[:PER_CALL].tolist(), recording.imu.gyr, recording.imu.acc,
+            recording.mag.mag, strict=False,
+        )
+    )  # fmt: skip
+
+    def track() -> None:
+        tracker = sd.estimators.create("robust-eskf").tracker()
+        for t, gyr, acc, mag in rows:
+            tracker.update(t, gyr, acc, mag)
+
+    times = take_turns(here=track)
+    table("robust-eskf `tracker.update` from Python", us(times["here"], PER_CALL), "", "4.5 us")
+    assert times["here"] / PER_CALL <= 4.5e-6
+
+
+@pytest.mark.parametrize(("name", "goal"), [("madgwick", 12), ("mekf", 12), ("robust-eskf", 10)])
+def test_pure_step_from_python(name, goal, recording, take_turns, table):
     flt, imu = sd.estimators.create(name), recording.imu
     rows = list(zip(imu.t[:PER_CALL].tolist(), imu.gyr, imu.acc, recording.mag.mag, strict=False))
 
@@ -99,8 +140,8 @@ def test_pure_step_from_python(name, recording, take_turns, table):
             state = flt.step(state, t, gyr, acc, mag=mag)
 
     times = take_turns(here=steps)
-    table(f"{name} `step` from Python", us(times["here"], PER_CALL), "", "12 us")
-    assert times["here"] / PER_CALL <= 12e-6
+    table(f"{name} `step` from Python", us(times["here"], PER_CALL), "", f"{goal} us")
+    assert times["here"] / PER_CALL <= goal * 1e-6
 
 
 def seconds(*arguments: str) -> float:

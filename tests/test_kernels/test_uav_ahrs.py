@@ -609,15 +609,54 @@ def test_where_there_is_no_field_the_first_course_is_the_heading():
     assert x[m.STD_ATT + 2] == pytest.approx(flt.std_heading)
 
 
-def test_reference_is_learned_from_the_first_field_and_kept():
-    flt = MultiModeAhrs()
+def test_reference_is_the_mean_of_the_first_fields_and_kept():
+    """Of 0.19 s; meanwhile the heading of the field corrects, and gravity in spite of GPS."""
+    flt = MultiModeAhrs(
+        learn_time=0.19, gate=np.inf, reject_disturbed=False, gyr_noise=1e-9,
+        gyr_bias_noise=(0.0, 0.0, 0.0),
+    )  # fmt: skip
     x, P = start(flt, scalar_first(TURNED))
-    w = feed(flt, x, P, 0.04, np.zeros(3), NO_ACC, TURNED.inv().apply([2e-5, 0, 4e-5]))
-    assert w[m.D_MAG + 6] == s.NOT_MEASURED
-    np.testing.assert_allclose(x[[mm.REF_H, mm.REF_D]], [2e-5, 4e-5], rtol=1e-12)
-    w = feed(flt, x, P, 0.08, np.zeros(3), NO_ACC, TURNED.inv().apply([2.1e-5, 0, 4e-5]))
-    assert w[m.D_MAG + 6] != s.NOT_MEASURED
-    np.testing.assert_allclose(x[[mm.REF_H, mm.REF_D]], [2e-5, 4e-5], rtol=1e-12)
+    P[:] = 1e-12 * P  # attitude does not move
+    rng, fields = np.random.default_rng(1), []
+    for i in range(1, 16):
+        field_n = np.array([2e-5, 0.0, 4e-5]) + 1e-6 * rng.standard_normal(3)
+        fields.append([np.hypot(*field_n[:2]), field_n[2]])
+        fix(x, 0.04 * i, 9 * np.cos(2.1), 9 * np.sin(2.1))
+        w = feed(flt, x, P, 0.04 * i, np.zeros(3), TURNED.inv().apply([0, 0, -G]),
+                 TURNED.inv().apply(field_n))  # fmt: skip
+        kept = min(i, 5)  # the first one starts the clock
+        np.testing.assert_allclose(
+            x[[mm.REF_H, mm.REF_D]], np.mean(fields[:kept], axis=0), rtol=1e-4
+        )
+        assert np.isnan(w[m.D_MAG + 1]) == (i < 6)  # one component, then three
+        assert (w[m.D_ACC + 6] == s.ACCEPTED) == (i < 6)
+    z = w[m.D_MAG : m.D_MAG + 3]
+    want = TURNED.inv().apply(field_n - [*np.array([1.0, 0.0]) * x[mm.REF_H], x[mm.REF_D]])
+    np.testing.assert_allclose(z, want, atol=1e-8)
+
+
+def test_heading_counts_while_the_reference_is_learned():
+    """The innovation is that of the standard filter, its variance that of the field."""
+    flt = MultiModeAhrs(gate=np.inf, reject_disturbed=False)
+    x, P = start(flt, scalar_first(TURNED))
+    before = quat(x)
+    turned = Rotation.from_euler("Z", 0.1) * TURNED
+    w = feed(flt, x, P, 0.04, np.zeros(3), NO_ACC, turned.inv().apply([2e-5, 0, 4e-5]))
+    assert w[m.D_MAG] == pytest.approx(0.1, abs=1e-6)
+    assert w[m.D_MAG + 3] > np.sqrt(7e-5) * 1e-4 / 2e-5
+    moved = (rotation(quat(x)) * rotation(before).inv()).as_rotvec()
+    assert moved[2] > 0.01
+
+
+def test_reference_may_be_the_first_field_alone():
+    flt = MultiModeAhrs(learn_time=0.0)
+    x, P = start(flt, scalar_first(TURNED))
+    for i, size in ((1, 1.0), (2, 1.05)):
+        feed(flt, x, P, 0.04 * i, np.zeros(3), NO_ACC, TURNED.inv().apply([size * 2e-5, 0, 4e-5]))
+        np.testing.assert_allclose(x[[mm.REF_H, mm.REF_D]], [2e-5, 4e-5], rtol=1e-9)
+    x, P = start(flt, [1.0, 0, 0, 0])
+    feed(flt, x, P, 0.04, np.zeros(3), NO_ACC, [0.0, 0.0, 5e-5])
+    assert x[mm.REF_H] == 0.0  # a vertical field tells no heading
 
 
 @pytest.mark.parametrize("angle", [0.0, 3.0, -3.0, 4.0, -7.0, 20.0])

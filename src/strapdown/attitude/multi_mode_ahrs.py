@@ -54,7 +54,9 @@ class MultiModeAhrs(UavAhrs):
         not used for so long brings the accelerometer back, too.
     mag_reference : tuple of 2 floats, optional
         Horizontal part and part down of the field [T], as of the world magnetic model; see `at`.
-        None: as first measured, with the dip that the first attitude makes of it.
+        None: learned from the first fields, with the dip that the attitude makes of them.
+    learn_time : float
+        How long it is learned [s]. Meanwhile gravity levels and the field turns, GPS or not.
     heading_jacobian : {'exact', 'printed'}
         Of yaw. Printed: with a factor too many; then a heading near +-90 deg is not corrected by
         the course, and from 90 to 128 deg it is driven away.
@@ -103,6 +105,7 @@ class MultiModeAhrs(UavAhrs):
     min_speed: float = 2.0
     fix_timeout: float = 1.5
     mag_reference: tuple[float, float] | None = None
+    learn_time: float = 5.0
     heading_jacobian: Literal["exact", "printed"] = "exact"
 
     def __post_init__(self) -> None:
@@ -112,7 +115,8 @@ class MultiModeAhrs(UavAhrs):
             raise ValueError(f"`gyr_bias_noise` must be non-negative, got {self.gyr_bias_noise}.")
         for name in ("mag_noise", "course_std", "fix_timeout"):
             _checks.positive(name, getattr(self, name))
-        _checks.positive("min_speed", self.min_speed, allow_zero=True)
+        for name in ("min_speed", "learn_time"):
+            _checks.positive(name, getattr(self, name), allow_zero=True)
         self._positive_or_infinite("mag_rate")
         _checks.one_of("heading_jacobian", self.heading_jacobian, ("exact", "printed"))
         if self.mag_reference is not None:
@@ -194,6 +198,8 @@ class MultiModeAhrs(UavAhrs):
         x[k.T_MAG] = x[k.T_COURSE] = -math.inf
         if self.mag_reference is not None:
             x[k.REF_H], x[k.REF_D] = self.mag_reference
+        else:
+            x[k.LEARN] = self.learn_time
         return x, P
 
     def _events(self, rec: Recording) -> FloatArray:

@@ -25,6 +25,7 @@ from strapdown.kernels.memory import (
     W_HEAD,
     Q,
     begin,
+    heading_from_mag,
     load,
     load_events,
     note,
@@ -35,6 +36,7 @@ from strapdown.kernels.memory import (
     turn_heading,
 )
 from strapdown.kernels.quat import rotate
+from strapdown.kernels.standard_ahrs import levelled_row
 from strapdown.kernels.uav_ahrs import (
     AS_PRINTED,
     P_ACC_NOISE,
@@ -74,7 +76,9 @@ REF_D = X_SHARED + 1  # its part down [T]
 T_MAG = X_SHARED + 2  # time of the last field that was used [s]; -inf: none
 T_COURSE = X_SHARED + 3  # time of the last valid course [s]; -inf: none, or lost
 HAD_GPS = X_SHARED + 4  # 1 once there was a fix
-X_SIZE = X_SHARED + 5
+LEARN = X_SHARED + 5  # how long the reference is still learned [s]; zero where it is given
+LEARNED = X_SHARED + 6  # samples that it is the mean of
+X_SIZE = X_SHARED + 7
 
 # --- own parameters ------------------------------------------------------------------------
 P_STD_COURSE = P_SHARED  # of a fix [rad]
@@ -90,13 +94,20 @@ D_COURSE = W_HEAD  # where they stand in a row of the diagnostics
 
 
 @kernel
+def learning(x: Vec) -> bool:
+    """Whether the reference field is not known yet."""
+    return bool(x[LEARN] > 0.0 or x[REF_H] == 0.0)
+
+
+@kernel
 def learn_reference(x: Vec) -> None:
-    """Take dip and magnitude of the reference from the field of the inbox, if not vertical."""
+    """Add dip and magnitude of the field in the inbox to their means, if it is not vertical."""
     mx, my, mz = rotate(x[Q], x[Q + 1], x[Q + 2], x[Q + 3], x[MAG + 1], x[MAG + 2], x[MAG + 3])
     h2 = mx * mx + my * my
     if h2 > 1e-12 * (h2 + mz * mz):
-        x[REF_H] = sqrt(h2)
-        x[REF_D] = mz
+        x[LEARNED] += 1.0
+        x[REF_H] += (sqrt(h2) - x[REF_H]) / x[LEARNED]
+        x[REF_D] += (mz - x[REF_D]) / x[LEARNED]
 
 
 @kernel
@@ -154,14 +165,26 @@ def align_by_course(x: Vec, P: Mat, p: Vec, course: float) -> None:
 
 @kernel
 def correct_field(x: Vec, P: Mat, p: Vec, w: Vec) -> bool:
-    """Enter the field of the inbox as a vector, (3.15); False if it is beyond the gate."""
+    """Enter the field of the inbox as a vector, (3.15); False if it is beyond the gate.
+
+    While its reference is learned, its heading only: the dip would agree with itself.
+    """
     r = variance_of(x, p[P_MAG_NOISE], p[P_MAG_PERIOD])
-    north, east = x[REF_H] * p[P_COS_D], x[REF_H] * p[P_SIN_D]
-    return bool(
-        update_vector(
+    accepted = True
+    if not learning(x):
+        north, east = x[REF_H] * p[P_COS_D], x[REF_H] * p[P_SIN_D]
+        accepted = update_vector(
             x, P, w, D_MAG, north, east, x[REF_D], x[MAG + 1], x[MAG + 2], x[MAG + 3], r, p[P_GATE]
         )
-    )
+    else:
+        left = heading_from_mag(x, 0.0, 0.0, 0.0, p[P_COS_D], p[P_SIN_D])
+        if not isnan(left) and x[REF_H] > 0.0:
+            levelled_row(x, p, w)
+            r /= x[REF_H] * x[REF_H]
+            left, expected, accepted = update_scalar(P, w, left, r, p[P_GATE])
+            note(w, D_MAG, nan, nan, nan, s.ACCEPTED if accepted else s.REJECTED_GATE)
+            note_sigma(w, D_MAG, 0, left, expected)
+    return accepted
 
 
 # fmt: off
@@ -174,9 +197,9 @@ def correct(
     # fmt: on
     forget(w)
     anything = False
-    if has_mag and x[REF_H] == 0.0:
+    if has_mag and learning(x):
         learn_reference(x)
-    elif has_mag and x[ALIGNED] != TILT and due(x, SINCE_MAG, p[P_MAG_PERIOD], dt):
+    if has_mag and x[ALIGNED] != TILT and due(x, SINCE_MAG, p[P_MAG_PERIOD], dt):
         anything = True
         if not correct_field(x, P, p, w):
             set_status(x, s.MAG_REJECTED)
@@ -189,7 +212,7 @@ def correct(
     gps = t - x[T_COURSE] <= p[P_TIMEOUT]
     if x[HAD_GPS] > 0.0 and not gps:
         set_status(x, s.OUTAGE)
-    mode_1 = gps and t - x[T_MAG] <= p[P_TIMEOUT]
+    mode_1 = gps and t - x[T_MAG] <= p[P_TIMEOUT] and not learning(x)
     if has_acc and due(x, SINCE_ACC, p[P_ACC_PERIOD], dt):
         if not mode_1:
             anything = True
@@ -220,10 +243,12 @@ def step(
     course = take_course(x, p, t)
     if not isnan(course):  # of the fix's time: yaw has gone on since
         course += yaw_rate(x, wx, wy, wz) * max(t - fixed_at, 0.0)
-    if todo == START and has_mag and x[ALIGNED] == FULL and x[REF_H] == 0.0:
-        learn_reference(x)
+    if x[LEARNED] > 0.0:
+        x[LEARN] = max(x[LEARN] - dt, 0.0)
     if todo == START and has_mag and x[ALIGNED] == FULL:
         x[T_MAG] = t
+        if learning(x):
+            learn_reference(x)
     if x[STARTED] == 0.0 and todo == START:
         restart(x, P, p)
         return

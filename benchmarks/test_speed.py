@@ -78,6 +78,30 @@ def test_filters_of_the_theses_are_within_twice_each_other(recording, take_turns
     assert ratio <= 2.0
 
 
+def test_kalman_filters_of_the_theses_cost_about_the_same(recording, take_turns, table):
+    """Two-stage, indirect with truncated propagation, and both AHRS: within a factor of two."""
+    flts = {
+        "two-stage": sd.attitude.TwoStage(),
+        "indirect-ekf truncated": sd.attitude.IndirectEkf(propagation="truncated"),
+        "standard-ahrs": sd.attitude.StandardAhrs(),
+        "multi-mode-ahrs": sd.attitude.MultiModeAhrs(),
+    }
+    runs = {
+        name: lambda flt=flt: flt.run(recording, diagnostics=False) for name, flt in flts.items()
+    }
+    times = take_turns(
+        5, **{name.replace("-", "_").replace(" ", "_"): r for name, r in runs.items()}
+    )
+    ratio, n = max(times.values()) / min(times.values()), len(recording.imu)
+    table(
+        "two-stage, indirect-ekf truncated, standard-ahrs, multi-mode-ahrs `run`, per sample",
+        ", ".join(ns(seconds, n) for seconds in times.values()),
+        f"dearest over cheapest: {ratio:.2f} times",
+        "2 times",
+    )
+    assert ratio <= 2.0
+
+
 @pytest.mark.parametrize("name", ["madgwick", "mekf"])
 def test_tracker_from_python(name, recording, take_turns, table):
     imu, field = recording.imu, recording.mag.mag

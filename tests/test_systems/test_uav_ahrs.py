@@ -179,3 +179,21 @@ def test_printed_heading_leaves_mode_1_open_at_90_deg(monkeypatch):
     exact = programs.heading
     monkeypatch.setattr(programs, "heading", lambda q, exact_=True, **_: exact(q))
     assert observability(*equations.matrices(("magnetic field", "yaw"))).rank == 5
+
+
+@pytest.mark.parametrize("make", [flight.standard, flight.multi])
+def test_covariance_is_sound_after_six_hours(make):
+    """The flight again and again: symmetric, positive but along q, which stays round-off."""
+    flt, rec = make(), flight.log("first", 0).rec
+    state = flt.init()
+    for k in range(72):
+        later = replace(
+            rec, imu=rec.imu.shifted(300.0 * k), mag=rec.mag.shifted(300.0 * k),
+            gnss=rec.gnss.shifted(300.0 * k),
+        )  # fmt: skip
+        _, state = flt.advance(state, later, diagnostics=False)
+    least = np.linalg.eigvalsh(state.P)
+    assert np.array_equal(state.P, state.P.T)
+    assert abs(least[0]) < 1e-15 * 0.4  # round-off of the start
+    assert least[1] > 1e-9
+    assert np.abs(state.P[:, :4] @ state.q_nb).max() < 1e-15 * 0.4

@@ -1,77 +1,35 @@
-"""Both AHRS kernels of thesis D against differences on the sphere, SymPy and dense matrices.
-
-The truth's errors are six, (dtheta_b, db): ``q_true = q exp(dtheta_b)``. The kernel's seven follow
-from ``dq = 1/2 q (0, dtheta_b)``.
-"""
+"""What both AHRS kernels share, against differences on the sphere, SymPy, dense matrices."""
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 from truth.kernel_step import bias, feed, quat, rotation, scalar_first, start
+from truth.sphere import (
+    FIELD_N,
+    H_STEP,
+    NO_ACC,
+    TURNED,
+    TURNS,
+    G,
+    along,
+    begun,
+    row,
+    seven,
+    six,
+    six_n,
+    some_covariance,
+    tangent,
+    with_attitude,
+)
 
 from strapdown.attitude import MultiModeAhrs, StandardAhrs
 from strapdown.kernels import memory as m
-from strapdown.kernels import multi_mode_ahrs as mm
-from strapdown.kernels import standard_ahrs as st
 from strapdown.kernels import status as s
 from strapdown.kernels import uav_ahrs as k
 from strapdown.systems.uav import programs
 
 sympy = pytest.importorskip("sympy")
-G = 9.80665
-FIELD_N = np.array([2.4762e-5, 8.2465e-7, 3.865e-5])
-TURNED = Rotation.from_euler("ZYX", [2.1, -0.4, 2.6])
-NO_ACC = np.full(3, np.inf)
-H_STEP = 1e-5  # of central differences: off by 1e-10 of the third derivative
-TURNS = [
-    Rotation.from_euler("ZYX", angles)
-    for angles in ([2.1, -0.4, 2.6], [-3.0, 0.9, -0.5], [1.57, 0.05, 0.2], [0.3, -1.2, 1.8])
-]
 FILTERS = [StandardAhrs, MultiModeAhrs]
-
-
-def tangent(q):
-    """What a turn dtheta_b makes of q: 4x3, ``1/2 q (0, e)`` as scalar and vector parts."""
-    w, v = q[0], q[1:]
-    return 0.5 * np.vstack((-v, w * np.eye(3) + np.cross(np.eye(3), v).T @ -np.eye(3)))
-
-
-def seven(P6, q):
-    """Covariance of the seven of that of the six."""
-    T = np.block([[tangent(q), np.zeros((4, 3))], [np.zeros((3, 3)), np.eye(3)]])
-    return T @ P6 @ T.T
-
-
-def six(P7, q):
-    """The other way: the columns of twice the tangent are orthonormal."""
-    T = np.block([[4.0 * tangent(q).T, np.zeros((3, 3))], [np.zeros((3, 4)), np.eye(3)]])
-    return T @ P7 @ T.T
-
-
-def some_covariance(seed=1, scale=1.0):
-    a = np.random.default_rng(seed).standard_normal((6, 6))
-    return scale * (a @ a.T + 0.1 * np.eye(6))
-
-
-def begun(flt, b0=(0.0, 0.0, 0.0), seed=None, scale=1e-2, r_nb=TURNED):
-    """Memory as after a sample at t = 0, with a covariance of one's own."""
-    x, P = start(flt, scalar_first(r_nb), b0)
-    if seed is not None:
-        P[:] = seven(some_covariance(seed, scale), quat(x))
-    return x, P
-
-
-def row(w):
-    return w[k.W_H : k.W_H + 4].copy()
-
-
-def along(f, r_nb):
-    """Derivative of a function of attitude with respect to dtheta_b, by central differences."""
-    return np.transpose([
-        (f(r_nb * Rotation.from_rotvec(H_STEP * e)) - f(r_nb * Rotation.from_rotvec(-H_STEP * e)))
-        / (2.0 * H_STEP)
-        for e in np.eye(3)
-    ])  # fmt: skip
 
 
 def test_tangent_is_what_a_small_turn_makes_of_the_quaternion():
@@ -196,12 +154,6 @@ def test_rows_are_those_that_sympy_derives():
         np.testing.assert_allclose(row(w), want, rtol=1e-12)
 
 
-def with_attitude(r_nb):
-    x = np.zeros(m.HEAD)
-    x[m.Q : m.Q + 4] = scalar_first(r_nb)
-    return x
-
-
 @pytest.mark.parametrize("r_nb", TURNS)
 def test_row_of_the_heading_agrees_with_central_differences_on_the_sphere(r_nb):
     x, w = with_attitude(r_nb), np.zeros(k.W_SHARED)
@@ -230,180 +182,6 @@ def test_printed_row_does_not_see_a_turn_at_90_deg_and_sees_it_reversed_at_120(y
 def test_where_the_x_axis_is_vertical_there_is_no_yaw(pitch):
     x = with_attitude(Rotation.from_euler("ZYX", [0.3, np.radians(pitch), 0.2]))
     assert not k.heading_row(x, np.zeros(k.W_SHARED), 0.0)
-
-
-@pytest.mark.parametrize("r_nb", TURNS)
-def test_row_of_the_levelled_heading_agrees_with_central_differences_on_the_sphere(r_nb):
-    """The measured field stays, what levels it moves: minus the slope of the innovation."""
-    flt = StandardAhrs(declination=0.3)
-    x, _ = begun(flt, r_nb=r_nb)
-    field = r_nb.inv().apply([2e-5 * np.cos(0.3), 2e-5 * np.sin(0.3), 3e-5])
-    x[m.MAG + 1 : m.MAG + 4] = field
-
-    def left(r):
-        h = r.apply(field)
-        return np.array([np.angle(np.exp(1j * (0.3 - np.arctan2(h[1], h[0]))))])
-
-    w = np.zeros(st.W_SIZE)
-    st.levelled_row(x, flt._params(), w)
-    np.testing.assert_allclose(row(w) @ tangent(quat(x)), -along(left, r_nb)[0], atol=1e-7)
-    seen = row(w)
-    # noise of the heading is no part of the row
-    turned = Rotation.from_euler("Z", 0.2) * r_nb
-    x[m.MAG + 1 : m.MAG + 4] = r_nb.inv().apply(turned.apply(field))
-    st.levelled_row(x, flt._params(), w)
-    np.testing.assert_allclose(row(w), seen, atol=1e-14)
-    assert st.heading_left(x, flt._params()) == pytest.approx(-0.2, abs=1e-12)
-
-
-def test_heading_levelled_as_before_is_the_compass_of_the_source():
-    """(2.43) to (2.45) with other angles than the estimate's."""
-    flt = StandardAhrs(declination=0.3, levelling="before")
-    x, _ = begun(flt)
-    roll, pitch = 0.4, -0.2
-    x[st.ROLL], x[st.PITCH] = roll, pitch
-    truth = Rotation.from_euler("ZYX", [-2.0, pitch, roll])
-    x[m.MAG + 1 : m.MAG + 4] = truth.inv().apply([2e-5, 0.0, 4e-5])
-    yaw = TURNED.as_euler("ZYX")[0]
-    want = np.angle(np.exp(1j * (-2.0 + 0.3 - yaw)))
-    assert st.heading_left(x, flt._params()) == pytest.approx(want, abs=1e-12)
-
-
-def test_tilt_is_kept_for_the_step_after():
-    flt = StandardAhrs(levelling="before")
-    x, P = begun(flt)
-    feed(flt, x, P, 0.02, [0.5, -0.3, 0.8], NO_ACC)
-    _, pitch, roll = rotation(quat(x)).as_euler("ZYX")
-    np.testing.assert_allclose(x[[st.ROLL, st.PITCH]], [roll, pitch], atol=1e-14)
-
-
-# --- one sample -------------------------------------------------------------------------
-
-
-def dense_update(P, q, b, z, H7, R):
-    """The thesis's update with matrices, in Joseph's form; the quaternion moves on its sphere."""
-    H = np.hstack((H7, np.zeros((len(H7), 3))))
-    K = P @ H.T @ np.linalg.inv(H @ P @ H.T + R)
-    dx = K @ z
-    I_KH = np.eye(7) - K @ H
-    dtheta = 4.0 * tangent(q).T @ dx[:4]
-    return rotation(q) * Rotation.from_rotvec(dtheta), b + dx[4:], I_KH @ P @ I_KH.T + K @ R @ K.T
-
-
-def gravity_rows(r_nb):
-    """Rows on all four components; what lies along q does not matter."""
-    q = scalar_first(r_nb)
-    return along(lambda r: r.inv().apply([0, 0, -G]), r_nb) @ (4.0 * tangent(q).T)
-
-
-def field_rows(r_nb):
-    q = scalar_first(r_nb)
-    return along(lambda r: r.inv().apply(FIELD_N), r_nb) @ (4.0 * tangent(q).T)
-
-
-def yaw_row(r_nb):
-    q = scalar_first(r_nb)
-    return along(lambda r: r.as_euler("ZYX")[:1], r_nb) @ (4.0 * tangent(q).T)
-
-
-def predicted(flt, x, P, rate, dt):
-    """State and covariance after the prediction, which has tests of its own."""
-    x, P = x.copy(), P.copy()
-    k.predict(x, P, flt._params(), np.zeros(k.W_SHARED), *rate, dt)
-    return quat(x), bias(x), P
-
-
-def same(x, P, r_nb, b, want, atol=1e-9):
-    """Rows are by differences."""
-    assert (rotation(quat(x)) * r_nb.inv()).magnitude() < atol
-    np.testing.assert_allclose(bias(x), b, atol=atol)
-    # P is carried along with q: about the axes of n it is what it was
-    for axis in np.eye(3):
-        u = np.r_[0.0, axis]
-        got = [side @ six_n(cov, q) @ side for side, cov, q in (
-            (u[1:], P, quat(x)), (u[1:], want[0], want[1]))]  # fmt: skip
-        assert got[0] == pytest.approx(got[1], abs=atol)
-    np.testing.assert_allclose(P[4:, 4:], want[0][4:, 4:], atol=atol)
-
-
-def six_n(P7, q):
-    """Covariance of the attitude's error about the axes of n."""
-    C = rotation(q).as_matrix()
-    return C @ six(P7, q)[:3, :3] @ C.T
-
-
-def test_standard_corrects_by_gravity_and_then_by_heading():
-    flt = StandardAhrs(declination=0.1, mag_rate=25.0, gate=np.inf)
-    b0, rate, dt = np.array([0.02, -0.01, 0.03]), np.array([0.5, -0.8, 1.3]), 0.04
-    x, P = begun(flt, b0, seed=8)
-    off = TURNED * Rotation.from_rotvec([0.05, -0.02, 0.03])
-    acc, mag = off.inv().apply([0.1, 0.2, -G]), off.inv().apply(FIELD_N)
-    q, b, P1 = predicted(flt, x, P, rate, dt)
-    z = acc - rotation(q).inv().apply([0, 0, -G])
-    r_acc, r_mag = 1.962361, 0.014924 * 2.5  # printed, at 25 Hz; the heading's for 10 Hz
-    r1, b, P1 = dense_update(P1, q, b, z, gravity_rows(rotation(q)), r_acc * np.eye(3))
-
-    def left(r):
-        h = r.apply(mag)
-        return np.array([np.angle(np.exp(1j * (0.1 - np.arctan2(h[1], h[0]))))])
-
-    def expected(r):
-        """The field as it is seen by r1 if its heading is as predicted, levelled by r."""
-        h = r1.apply(mag)
-        h = np.array([np.hypot(*h[:2]) * np.cos(0.1), np.hypot(*h[:2]) * np.sin(0.1), h[2]])
-        h = r.apply(r1.inv().apply(h))
-        return np.array([np.angle(np.exp(1j * (0.1 - np.arctan2(h[1], h[0]))))])
-
-    q1 = scalar_first(r1)
-    turn = carried(P1, q, q1)
-    H = -along(expected, r1) @ (4.0 * tangent(q1).T)
-    r2, b, P2 = dense_update(turn, q1, b, left(r1), H, np.array([[r_mag]]))
-    w = feed(flt, x, P, dt, rate, acc, mag)
-    same(x, P, r2, b, (P2, q1))
-    assert w[m.D_ACC + 6] == w[m.D_MAG + 6] == s.ACCEPTED
-    np.testing.assert_allclose(w[m.D_MAG], left(r1)[0], atol=1e-9)
-
-
-def carried(P7, q, q_new):
-    """Covariance whose errors stay about the axes of n while q moves."""
-    T = np.zeros((7, 7))
-    T[4:, 4:] = np.eye(3)
-    C, C_new = rotation(q).as_matrix(), rotation(q_new).as_matrix()
-    T[:4, :4] = tangent(q_new) @ C_new.T @ C @ (4.0 * tangent(q).T)
-    return T @ P7 @ T.T
-
-
-@pytest.mark.parametrize("mode", [1, 2])
-def test_multi_mode_is_one_update_with_all_rows_stacked(mode):
-    flt = MultiModeAhrs(
-        declination=float(np.arctan2(FIELD_N[1], FIELD_N[0])), gate=np.inf, min_speed=1.0,
-        mag_reference=(float(np.hypot(*FIELD_N[:2])), float(FIELD_N[2])), acc_rate=25.0,
-    )  # fmt: skip
-    b0, rate, dt = np.array([0.02, -0.01, 0.03]), np.array([0.5, -0.8, 1.3]), 0.04
-    x, P = begun(flt, b0, seed=9)
-    x[mm.T_MAG] = 0.0
-    off = TURNED * Rotation.from_rotvec([0.05, -0.02, 0.03])
-    acc, mag = off.inv().apply([0.1, 0.2, -G]), off.inv().apply(FIELD_N)
-    q, b, P1 = predicted(flt, x, P, rate, dt)
-    r_nb = rotation(q)
-    course = r_nb.as_euler("ZYX")[0] + 0.04
-    z, H = mag - r_nb.inv().apply(FIELD_N), field_rows(r_nb)
-    R = [7e-5 * 1e-8] * 3  # printed, in T^2
-    if mode == 1:
-        x[m.GNSS] = 1.0
-        x[m.GNSS + 1 : m.GNSS + 15] = np.nan
-        x[m.GNSS + 1] = dt
-        x[m.GNSS + 5 : m.GNSS + 7] = 9 * np.cos(course), 9 * np.sin(course)
-        z, H, R = np.append(z, 0.04), np.vstack((H, yaw_row(r_nb))), [*R, 0.001]
-    else:
-        z = np.append(z, acc - r_nb.inv().apply([0, 0, -G]))
-        H, R = np.vstack((H, gravity_rows(r_nb))), [*R, *[1.962361] * 3]
-    want_r, want_b, want_P = dense_update(P1, q, b, z, H, np.diag(R))
-    w = feed(flt, x, P, dt, rate, acc, mag)
-    same(x, P, want_r, want_b, (want_P, q), atol=2e-8)
-    used = (w[m.D_ACC + 6], w[mm.W_COURSE + 6])
-    assert used == ((s.NOT_MEASURED, s.ACCEPTED) if mode == 1 else (s.ACCEPTED, s.NOT_MEASURED))
-    assert x[m.GNSS] == 0.0
 
 
 @pytest.mark.parametrize("cls", FILTERS)
@@ -446,7 +224,8 @@ def test_as_printed_is_the_program_in_dense_matrices(cls):
         gyr = rate + [0.1, 0.25, 0.5]
         if cls is MultiModeAhrs:
             if valid:
-                fix(x, i * dt, *v_n)
+                x[m.GNSS : m.GNSS + 2] = 1.0, i * dt
+                x[m.GNSS + 5 : m.GNSS + 7] = v_n
             programs.multi_mode(memory, mag, acc, gyr, v_n, valid=valid)
         else:
             programs.standard(memory, mag, acc, gyr)
@@ -535,158 +314,6 @@ def test_independent_heading_leaves_tilt_alone_and_forgets_its_own():
     assert np.array_equal(P, P.T)
 
 
-# --- GPS --------------------------------------------------------------------------------
-
-
-def fix(x, t, v_n, v_e):
-    x[m.GNSS] = 1.0
-    x[m.GNSS + 1 : m.GNSS + 15] = np.nan
-    x[m.GNSS + 1] = t
-    x[m.GNSS + 5], x[m.GNSS + 6] = v_n, v_e
-
-
-def flying(**parameters):
-    flt = MultiModeAhrs(mag_reference=(2.4e-5, 3.9e-5), fix_timeout=0.31, **parameters)
-    x, P = start(flt, [1.0, 0, 0, 0])
-    return flt, x, P
-
-
-def modes(flt, x, P, fixes, n=60):
-    """Which samples were corrected by the accelerometer; fixes by sample number."""
-    used, outage = [], []
-    for i in range(1, n + 1):
-        if i in fixes:
-            fix(x, i * 0.02, *fixes[i])
-        w = feed(flt, x, P, i * 0.02, np.zeros(3), [0, 0, -G], [2.4e-5, 0, 3.9e-5])
-        used += [i] if w[m.D_ACC + 6] != s.NOT_MEASURED else []
-        outage += [i] if int(x[m.STATUS]) & s.OUTAGE else []
-    return used, outage
-
-
-def test_gravity_counts_from_the_loss_of_gps_to_its_return():
-    """Fixes up to sample 20, lost 0.32 s later, one again at sample 45."""
-    flt, x, P = flying()
-    used, outage = modes(flt, x, P, {i: (9.0, 0.0) for i in [*range(4, 21, 2), *range(45, 61, 2)]})
-    assert used == [2, 36, 38, 40, 42, 44]
-    assert outage == list(range(36, 45))
-
-
-@pytest.mark.parametrize("lost", [(np.nan, np.nan), (1.0, 1.0)])
-def test_a_fix_without_a_course_switches_at_once(lost):
-    flt, x, P = flying()
-    used, outage = modes(flt, x, P, {2: (9.0, 0.0), 6: (9.0, 0.0), 8: lost}, 14)
-    assert used == [8, 10, 12, 14]
-    assert outage == list(range(8, 15))
-
-
-def test_without_a_field_gravity_counts_although_there_is_gps():
-    flt, x, P = flying(use_mag=False)
-    used, _ = modes(flt, x, P, {i: (9.0, 0.0) for i in range(2, 41, 2)}, 40)
-    assert used == list(range(2, 41, 2))
-
-
-def test_a_late_course_is_compared_with_the_yaw_of_its_time():
-    """Turning at 1 rad/s about a banked axis, the fix is 0.1 s old."""
-    flt, x, P = flying(gate=np.inf)
-    bank = Rotation.from_euler("X", 0.4)
-    x[m.Q : m.Q + 4] = scalar_first(bank)
-    rate = bank.inv().apply([0.0, 0.0, 1.0])
-    fix(x, -0.08, 9.0 * np.cos(-0.08), 9.0 * np.sin(-0.08))
-    w = feed(flt, x, P, 0.02, rate, NO_ACC)
-    assert w[mm.W_COURSE] == pytest.approx(0.0, abs=1e-12)
-
-
-def test_where_there_is_no_field_the_first_course_is_the_heading():
-    flt = MultiModeAhrs()
-    state = flt.init()
-    x, P = state.x, state.P
-    tilted = Rotation.from_euler("ZYX", [0.0, 0.1, -0.2])
-    feed(flt, x, P, 0.0, np.zeros(3), tilted.inv().apply([0, 0, -G]))
-    fix(x, 0.02, 0.0, -9.0)
-    feed(flt, x, P, 0.02, np.zeros(3), NO_ACC)
-    want = Rotation.from_euler("ZYX", [-np.pi / 2, 0.1, -0.2])
-    assert (rotation(quat(x)) * want.inv()).magnitude() < 1e-12
-    assert x[m.STD_ATT + 2] == pytest.approx(flt.std_heading)
-
-
-def test_reference_is_the_mean_of_the_first_fields_and_kept():
-    """Of 0.19 s; meanwhile the heading of the field corrects, and gravity in spite of GPS."""
-    flt = MultiModeAhrs(
-        learn_time=0.19, gate=np.inf, reject_disturbed=False, gyr_noise=1e-9,
-        gyr_bias_noise=(0.0, 0.0, 0.0),
-    )  # fmt: skip
-    x, P = start(flt, scalar_first(TURNED))
-    P[:] = 1e-12 * P  # attitude does not move
-    rng, fields = np.random.default_rng(1), []
-    for i in range(1, 16):
-        field_n = np.array([2e-5, 0.0, 4e-5]) + 1e-6 * rng.standard_normal(3)
-        fields.append([np.hypot(*field_n[:2]), field_n[2]])
-        fix(x, 0.04 * i, 9 * np.cos(2.1), 9 * np.sin(2.1))
-        w = feed(flt, x, P, 0.04 * i, np.zeros(3), TURNED.inv().apply([0, 0, -G]),
-                 TURNED.inv().apply(field_n))  # fmt: skip
-        kept = min(i, 5)  # the first one starts the clock
-        np.testing.assert_allclose(
-            x[[mm.REF_H, mm.REF_D]], np.mean(fields[:kept], axis=0), rtol=1e-4
-        )
-        assert np.isnan(w[m.D_MAG + 1]) == (i < 6)  # one component, then three
-        assert (w[m.D_ACC + 6] == s.ACCEPTED) == (i < 6)
-    z = w[m.D_MAG : m.D_MAG + 3]
-    want = TURNED.inv().apply(field_n - [*np.array([1.0, 0.0]) * x[mm.REF_H], x[mm.REF_D]])
-    np.testing.assert_allclose(z, want, atol=1e-8)
-
-
-def test_heading_counts_while_the_reference_is_learned():
-    """The innovation is that of the standard filter, its variance that of the field."""
-    flt = MultiModeAhrs(gate=np.inf, reject_disturbed=False)
-    x, P = start(flt, scalar_first(TURNED))
-    before = quat(x)
-    turned = Rotation.from_euler("Z", 0.1) * TURNED
-    w = feed(flt, x, P, 0.04, np.zeros(3), NO_ACC, turned.inv().apply([2e-5, 0, 4e-5]))
-    assert w[m.D_MAG] == pytest.approx(0.1, abs=1e-6)
-    assert w[m.D_MAG + 3] > np.sqrt(7e-5) * 1e-4 / 2e-5
-    moved = (rotation(quat(x)) * rotation(before).inv()).as_rotvec()
-    assert moved[2] > 0.01
-
-
-def test_reference_may_be_the_first_field_alone():
-    flt = MultiModeAhrs(learn_time=0.0)
-    x, P = start(flt, scalar_first(TURNED))
-    for i, size in ((1, 1.0), (2, 1.05)):
-        feed(flt, x, P, 0.04 * i, np.zeros(3), NO_ACC, TURNED.inv().apply([size * 2e-5, 0, 4e-5]))
-        np.testing.assert_allclose(x[[mm.REF_H, mm.REF_D]], [2e-5, 4e-5], rtol=1e-9)
-    x, P = start(flt, [1.0, 0, 0, 0])
-    feed(flt, x, P, 0.04, np.zeros(3), NO_ACC, [0.0, 0.0, 5e-5])
-    assert x[mm.REF_H] == 0.0  # a vertical field tells no heading
-
-
 @pytest.mark.parametrize("angle", [0.0, 3.0, -3.0, 4.0, -7.0, 20.0])
 def test_wrap_is_within_half_a_turn(angle):
     assert k.wrap(angle) == pytest.approx(np.angle(np.exp(1j * angle)), abs=1e-14)
-
-
-def test_gate_bounds_the_pull_of_field_and_course_but_not_of_gravity():
-    """A course far off moves the state no more than one at the gate; a force has no gate."""
-    found = []
-    for yaw in (0.5, 2.5):
-        flt, x, P = flying(gate=3.0)
-        P[:] = seven(1e-4 * np.eye(6), quat(x))
-        fix(x, 0.02, 9.0 * np.cos(yaw), 9.0 * np.sin(yaw))
-        w = feed(flt, x, P, 0.02, np.zeros(3), NO_ACC)
-        assert w[mm.W_COURSE + 6] == s.REJECTED_GATE
-        assert int(x[m.STATUS]) & s.AIDING_REJECTED
-        found.append(rotation(quat(x)).magnitude())
-    assert 0.0 < found[1] < found[0]
-    for bad, flag, sensor in (
-        ([2.4e-5, 3e-5, 3.9e-5], s.MAG_REJECTED, m.D_MAG),
-        (np.empty(0), 0, m.D_ACC),
-    ):
-        flt, x, P = flying(gate=3.0, reject_disturbed=False)
-        P[:] = seven(1e-4 * np.eye(6), quat(x))
-        w = feed(flt, x, P, 0.04, np.zeros(3), [50.0, 0.0, -G], bad)
-        assert w[sensor + 6] == (s.REJECTED_GATE if flag else s.ACCEPTED)
-        assert int(x[m.STATUS]) & s.MAG_REJECTED == flag
-    flt = StandardAhrs(gate=3.0)
-    x, P = start(flt, [1.0, 0, 0, 0])
-    P[:] = seven(1e-4 * np.eye(6), quat(x))
-    w = feed(flt, x, P, 0.02, np.zeros(3), NO_ACC, [-2.4e-5, 0.0, 3.9e-5])
-    assert w[m.D_MAG + 6] == s.REJECTED_GATE

@@ -4,7 +4,7 @@ import datetime as dt
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar, Literal, Self
+from typing import Any, ClassVar, Final, Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,6 +17,8 @@ from strapdown.estimator import Estimator, Taken, register
 from strapdown.kernels import memory as _m
 from strapdown.recording import Recording
 from strapdown.units import GAUSS
+
+FIELD_N: Final = (0.24762, 0.0082465, 0.3865)  # of the program, north, east, down [G]
 
 
 @register(
@@ -218,6 +220,3 @@ class MultiModeAhrs(UavAhrs):
         if rec.gnss is not None and (rec.mag is None or not self.use_mag):
             return "true"
         return AttitudeEstimator._heading_reference(self, rec)
-
-
-FIELD_N = (0.24762, 0.0082465, 0.3865)  # of the program, north, east, down [G]

@@ -10,10 +10,10 @@ from test_systems.shown import count, missed, rows, shown
 from strapdown.kalman import observability
 from strapdown.rotation import dcm_from_quat
 from strapdown.systems import Verdict
-from strapdown.systems.uav import equations, flight, programs
+from strapdown.systems.uav import equations, flight, programs, wind
 from strapdown.units import DEG, GAUSS
 
-PARTS = ("equations", "ahrs", "outages", "slow-biases", "tight", "ins")
+PARTS = ("equations", "ahrs", "outages", "slow-biases", "tight", "wind", "ins")
 TABLES = [
     ("equations", "3.2.1, rank of the observability matrix", 6),
     ("equations", "A.1", 6),
@@ -31,6 +31,8 @@ TABLES = [
     ("slow-biases", "S6, S7", 20),
     ("slow-biases", "S9", 20),
     ("tight", "S8", 21),
+    ("wind", "S10, 1.6 m/s", 5),
+    ("wind", "S10, 3.3 m/s", 5),
     ("ins", "4.1", 8),
     ("ins", "appendix B", 1),
     ("ins", "(1.2)", 1),
@@ -48,6 +50,7 @@ ALWAYS = {
     },
     "slow-biases": set(),
     "tight": set(),
+    "wind": set(),
     "ins": set(),
 }  # fmt: skip
 
@@ -73,7 +76,7 @@ def test_rows_are_json(part):
     for row in rows("uav", part).values():
         json.dumps(row.summary(), allow_nan=False)
     assert len(shown("uav", part).blocks) == {
-        "equations": 0, "ahrs": 2, "outages": 2, "slow-biases": 4, "tight": 1, "ins": 1,
+        "equations": 0, "ahrs": 2, "outages": 2, "slow-biases": 4, "tight": 1, "wind": 2, "ins": 1,
     }[part]  # fmt: skip
 
 
@@ -132,6 +135,18 @@ def test_gps_is_lost_where_the_scenario_says():
     for begin in (75.0, 175.0):
         assert not np.any((t >= begin) & (t < begin + 25.0))
     assert np.sum((t > 40) & (t < 60)) == pytest.approx(500, abs=1)
+
+
+def test_a_breeze_turns_the_course_and_nothing_else():
+    flown = flight.log("tight", 0, varying=True)
+    blown = wind.carried(flown, 2.0)
+    drift = blown.rec.gnss.v_n - flown.rec.gnss.v_n
+    np.testing.assert_allclose(drift, np.tile([2**0.5, 2**0.5, 0.0], (len(drift), 1)), atol=1e-12)
+    assert blown.rec.imu is flown.rec.imu
+    assert blown.rec.mag is flown.rec.mag
+    plain = flight.standard()
+    streams = [plain.run(one.rec, diagnostics=False).q_nb for one in (flown, blown)]
+    np.testing.assert_array_equal(*streams)  # it has no GPS
 
 
 # --- wrong filters ------------------------------------------------------------------------

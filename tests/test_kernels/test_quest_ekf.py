@@ -253,21 +253,32 @@ def test_nine_measurements_are_the_dense_update_with_vectors_in_b(declination):
 
 @pytest.mark.parametrize("declination", [None, 0.3])
 @pytest.mark.parametrize("dip", [None, DIP])
-def test_quest_is_the_dense_update_with_wahbas_solution(dip, declination):
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_quest_is_the_dense_update_with_wahbas_solution(dip, declination, sign):
+    """Of the two quaternions of an attitude the estimate may be either."""
     flt = QuestEkf(dip=dip, declination=declination, **SAMPLE)
     P6 = some_covariance(8, 0.1)
     x, P = begun(flt, (0.4, -0.3, 0.6), P6)
+    for cell in (m.Q, lay.Q_P):
+        x[cell : cell + 4] *= sign
+    P[:] = seven(P6, quat(x))
     rate, dt, acc, mag = a_sample()
     P6, omega, r_nb = predicted(flt, P6, (0.4, -0.3, 0.6), TURNED, rate, dt)
-    r_d, r_m = (1.5 / G) ** 2 / dt, 0.25**2 / dt
+    # an acceleration of any direction spreads that of f by 1 / (g |f|)
+    r_d, r_m = 1.5**2 / (G * np.linalg.norm(acc)) / dt, 0.25**2 / dt
     turn = Rotation.from_euler("Z", declination or 0.0)
     field = turn.inv().apply(r_nb.apply(unit(mag)))
     between = np.arcsin(unit(mag) @ unit(-acc))
     found = wahba(unit(-acc), unit(mag), between if dip is None else dip, [1 / r_d, 1 / r_m])
-    z = (turn * found * r_nb.inv()).as_rotvec()
-    R = quest_r(r_d, r_m, np.arcsin(field[2]) if dip is None else dip, dip_is_measured=dip is None)
-    R = turn.as_matrix() @ R @ turn.as_matrix().T
-    want = updated(P6, omega, r_nb, np.eye(3), z, R)
+    # where the estimate has QUEST's down, in magnetic north, east, down, and the measured field
+    d = np.arcsin(field[2]) if dip is None else dip
+    down = (turn.inv() * r_nb * (turn * found).inv()).apply([0, 0, 1])
+    tilt = np.array([down[1], -down[0]])
+    if dip is not None:  # of the quaternions' difference
+        tilt = 2.0 * (turn.inv() * (turn * found) * r_nb.inv() * turn).as_quat()[:2]
+    z = np.r_[tilt, np.tan(d) * tilt[0] - np.arctan2(field[1], field[0])]
+    R = turn.as_matrix() @ quest_r(r_d, r_m, d, dip_is_measured=dip is None) @ turn.as_matrix().T
+    want = updated(P6, omega, r_nb, np.eye(3), turn.apply(z), R)
     w = feed(flt, x, P, dt, rate, acc, mag)
     assert_is(x, P, *want)
     assert w[m.D_ACC + 6] == w[m.D_MAG + 6] == s.ACCEPTED
@@ -294,20 +305,19 @@ def test_field_of_measured_dip_is_a_heading(measurements):
 
 
 @pytest.mark.parametrize("dip", [None, DIP])
-def test_accelerometer_alone_levels_the_short_way(dip):
-    """Down by the turn, not by its sine: two rows, heading open."""
+def test_accelerometer_alone_is_a_direction(dip):
+    """Two rows, heading open."""
     flt = QuestEkf(dip=dip, **SAMPLE)
     P6 = some_covariance(8, 0.1)
     x, P = begun(flt, P6=P6)
     rate, dt, acc, _ = a_sample()
     P6, omega, r_nb = predicted(flt, P6, np.zeros(3), TURNED, rate, dt)
     v = r_nb.apply(unit(-acc))
-    axis = np.cross(v, [0, 0, 1])
-    z = (np.arctan2(np.linalg.norm(axis), v[2]) * unit(axis))[:2]
-    R = (1.5 / G) ** 2 / dt * np.eye(2)
-    want = updated(P6, omega, r_nb, np.eye(3)[:2], z, R)
-    feed(flt, x, P, dt, rate, acc)
+    R = 1.5**2 / (G * np.linalg.norm(acc)) / dt * np.eye(2)
+    want = updated(P6, omega, r_nb, np.eye(3)[:2], np.array([v[1], -v[0]]), R)
+    w = feed(flt, x, P, dt, rate, acc)
     assert_is(x, P, *want)
+    np.testing.assert_allclose(w[m.D_ACC], v[0], atol=1e-9)
 
 
 # --- QUEST ------------------------------------------------------------------------------------

@@ -7,7 +7,7 @@ to the quaternion in `Q_P`; what has turned q since then is made good before P i
 numbers are those of spec B (thesis "kinematic device", section 4.3.3).
 """
 
-from math import exp, inf, isnan, nan, pi, sqrt
+from math import atan2, exp, inf, isnan, nan, pi, sqrt
 
 from strapdown.kernels import status as s
 from strapdown.kernels._jit import Mat, Vec, kernel
@@ -35,7 +35,7 @@ from strapdown.kernels.memory import (
     store,
 )
 from strapdown.kernels.quat import exp as exp_q
-from strapdown.kernels.quat import from_two_vectors, log, mul, normalize, rotate
+from strapdown.kernels.quat import mul, normalize, rotate
 from strapdown.kernels.quest_ekf_covariance import (
     add_turn,
     belongs,
@@ -195,27 +195,27 @@ def correct(
     if has_acc and p[P_VECTORS] > 0.0:
         # Scaled, not normalised: linear accelerations then average out.
         k = -1.0 / p[P_GRAVITY]
-        vx, vy, vz = rotate(qw, qx, qy, qz, k * ax, k * ay, k * az)
+        vx, vy, _ = rotate(qw, qx, qy, qz, k * ax, k * ay, k * az)
         n, e = p[P_COS_D] * vx + p[P_SIN_D] * vy, p[P_COS_D] * vy - p[P_SIN_D] * vx
         update_down(x, P, p, w, n, e, r_d, r_d)
     elif has_acc:
         k = -1.0 / sqrt(ax * ax + ay * ay + az * az)  # at rest f_b points up, so -f_b points down
+        # An acceleration of any direction spreads that of f like (sigma_a^2 / (g |f|)): a long f
+        # counts more, a short one less, and over time accelerations average out.
+        r_d *= -k * p[P_GRAVITY]
         ax, ay, az = k * ax, k * ay, k * az
         fw, fx, fy, fz = nan, nan, nan, nan
         if has_mag:
             fw, fx, fy, fz = quest(
                 ax, ay, az, mx, my, mz, p[P_SIN_DIP], 1.0 / r_d, 1.0 / r_m, p[P_COS_D], p[P_SIN_D]
             )
-            fw, fx, fy, fz = mul(fw, fx, fy, fz, qw, -qx, -qy, -qz)
         if isnan(fw):  # one vector alone leaves the turn about it open
-            vx, vy, vz = rotate(qw, qx, qy, qz, ax, ay, az)
-            fw, fx, fy, fz = from_two_vectors(vx, vy, vz, 0.0, 0.0, 1.0)
-            rx, ry, rz = log(fw, fx, fy, fz)
-            n, e = p[P_COS_D] * rx + p[P_SIN_D] * ry, p[P_COS_D] * ry - p[P_SIN_D] * rx
-            update_down(x, P, p, w, -e, n, r_d, r_d)
+            vx, vy, _ = rotate(qw, qx, qy, qz, ax, ay, az)
+            n, e = p[P_COS_D] * vx + p[P_SIN_D] * vy, p[P_COS_D] * vy - p[P_SIN_D] * vx
+            update_down(x, P, p, w, n, e, r_d, r_d)
         else:
-            rx, ry, rz = log(fw, fx, fy, fz)
-            update_both(x, P, p, w, rx, ry, rz, c, d, r_d, r_m)
+            fw, fx, fy, fz = mul(qw, qx, qy, qz, fw, -fx, -fy, -fz)
+            update_both(x, P, p, w, fw, fx, fy, fz, atan2(east, north), c, d, r_d, r_m)
             has_mag = False
     if has_mag:
         update_field(x, P, p, w, north, east, down, c, d, r_m)

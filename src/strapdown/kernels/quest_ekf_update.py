@@ -14,7 +14,7 @@ from strapdown.kernels.memory import (
     note_sigma,
     set_status,
 )
-from strapdown.kernels.quat import exp, from_dcm, mul, normalize
+from strapdown.kernels.quat import exp, from_dcm, mul, normalize, rotate
 from strapdown.kernels.quest_ekf_layout import (
     MIN_SINE,
     P_GATE,
@@ -189,23 +189,30 @@ def quest(
 # fmt: off
 @kernel
 def update_both(
-    x: Vec, P: Mat, p: Vec, w: Vec, rx: float, ry: float, rz: float, c: float, d: float,
-    r_d: float, r_m: float,
+    x: Vec, P: Mat, p: Vec, w: Vec, ew: float, ex: float, ey: float, ez: float, angle: float,
+    c: float, d: float, r_d: float, r_m: float,
 ) -> None:
-    """Enter QUEST's quaternion, which is off by r_n; the field's reference is ``(c, 0, d)``.
+    """Enter QUEST's quaternion; ``e`` turns what it finds in n to where the estimate has it.
 
     Its covariance, the inverse of ``(I - down down^T) / r_d + (I - m m^T) / r_m``, has no
-    correlation between the turns about north, about east, and about ``down x m x down`` as it
-    moves the field to the east.
+    correlation between the turns that move down to the north and to the east, and the one that
+    moves the field ``m = (c, 0, d)`` to the east. These three are entered, the last as the angle
+    to the east that the field is measured at: however far an acceleration bends down, it does not
+    turn the heading. If the field shares in the tilt, it is that of the quaternions' difference:
+    down itself would be off by half of tilt times heading, which are correlated.
     """
     # fmt: on
-    north = p[P_COS_D] * rx + p[P_SIN_D] * ry
-    east = p[P_COS_D] * ry - p[P_SIN_D] * rx
     r_east = r_d
-    if not isnan(p[P_SIN_DIP]):
+    if isnan(p[P_SIN_DIP]):
+        vx, vy, _ = rotate(ew, ex, ey, ez, 0.0, 0.0, 1.0)
+    else:
         r_east = r_d * r_m / (r_d + r_m)
-    update_down(x, P, p, w, -east, north, r_east, r_d)
-    if not update_east(x, P, p, w, c, d, d * north - c * rz, r_m):
+        k = 2.0 if ew > 0.0 else -2.0
+        vx, vy = k * ey, -k * ex
+    north = p[P_COS_D] * vx + p[P_SIN_D] * vy
+    east = p[P_COS_D] * vy - p[P_SIN_D] * vx
+    update_down(x, P, p, w, north, east, r_east, r_d)
+    if not update_east(x, P, p, w, c, d, c * angle, r_m):
         set_status(x, s.MAG_REJECTED)
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.linalg import solve_continuous_are
 from scipy.spatial.transform import Rotation
-from truth import hand
+from truth import hand, streams
 from truth.matched import Sizes, draw
 
 from strapdown.attitude import QuestEkf
@@ -117,6 +117,40 @@ def test_printed_order_lags_by_one_interval():
     }
     assert yaw["corrected"] == pytest.approx(2.0, abs=1e-6)
     assert yaw["printed"] == pytest.approx(1.9, abs=20 * 1e-3 / 12)  # a^3 / 12 short at each turn
+
+
+VARIANTS = [
+    {"measurements": "vectors"}, {"dip": DIP}, {"measurements": "vectors", "dip": DIP},
+    {"integration": "printed"}, {"integration": "printed", "dip": DIP},
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("parameters", VARIANTS, ids=str)
+def test_variants_too_give_the_bits_of_run_sample_by_sample(parameters):
+    flt, rec = QuestEkf(**parameters), streams.rough_log()
+    state, states = flt.init(), []
+    for sample in streams.samples(rec):
+        state = flt.step(state, *sample)
+        states.append(state)
+    streams.assert_same_bits(flt.run(rec), streams.collect(states))
+
+
+@pytest.mark.parametrize("parameters", VARIANTS, ids=str)
+def test_variants_too_stay_finite_in_noise_without_sense(parameters):
+    rng = np.random.default_rng(2)
+    t = np.cumsum(10.0 ** rng.uniform(-6, 1, 3000))
+    wild = [10.0 ** rng.uniform(-8, 8, (3000, 1)) * rng.standard_normal((3000, 3)) for _ in "gam"]
+    for array in wild:
+        array[rng.random(3000) < 0.1] = np.nan
+        array[rng.random(3000) < 0.1] = 0.0
+    rec = Recording(imu=Imu(t=t, gyr=wild[0], acc=wild[1]), mag=Mag(t=t, mag=wild[2]))
+    flt = QuestEkf(**parameters)
+    sol, state = flt.advance(flt.init(), rec)
+    assert np.isfinite(sol.q_nb).all()
+    assert np.isfinite(sol.std_attitude_n).all()
+    np.testing.assert_allclose(np.linalg.norm(sol.q_nb, axis=1), 1.0, rtol=0, atol=1e-12)
+    assert np.isfinite(state.x).sum() == len(state.x)
+    assert np.isfinite(state.P).all()
 
 
 @pytest.mark.parametrize(

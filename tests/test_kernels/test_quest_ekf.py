@@ -514,3 +514,15 @@ def test_printed_order_turns_with_the_rate_of_the_sample_before():
     assert lag["corrected"] == pytest.approx(0.0, abs=1e-7)
     # the last sample's 0.03 rad are missing; Euler's turn is short by 0.02**3 / 12
     assert lag["printed"] == pytest.approx(0.03, abs=1e-6)
+
+
+@pytest.mark.parametrize(("rate", "same"), [(4.0, False), (6.0, True)])
+def test_large_turns_are_taken_exactly_by_both(rate, same):
+    found = []
+    for integration in ("corrected", "printed"):
+        flt = QuestEkf(integration=integration)
+        x, P = begun(flt, (0.0, 0.0, rate), some_covariance(3))
+        feed(flt, x, P, 0.1, [0.0, 0.0, rate], NO_ACC)
+        found.append((quat(x), P))
+    assert np.array_equal(found[0][0], found[1][0]) == same
+    assert np.array_equal(found[0][1], found[1][1]) == same

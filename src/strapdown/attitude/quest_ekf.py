@@ -62,7 +62,8 @@ class QuestEkf(AttitudeEstimator):
         heading only; given, it shares in roll and pitch.
     integration : {'corrected', 'printed'}
         Corrected: the rate of the interval turns the quaternion, exactly. Printed: the rate of
-        the sample before does, to first order, (68); attitude then lags by an interval.
+        the sample before does, to first order, (68); attitude then lags by an interval. A turn of
+        more than 0.5 rad in a sample is taken exactly in both.
     std_tilt, std_heading : float
         Standard deviations of the first alignment [rad].
     gate : float

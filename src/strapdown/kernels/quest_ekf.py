@@ -51,6 +51,7 @@ from strapdown.kernels.quest_ekf_covariance import (
     write_std,
 )
 from strapdown.kernels.quest_ekf_layout import (
+    MAX_EULER,
     MIN_SINE,
     P_ACC_NOISE,
     P_EULER,
@@ -129,7 +130,8 @@ def predict(x: Vec, P: Mat, p: Vec, w: Vec, wx: float, wy: float, wz: float, dt:
     """
     tau = p[P_RATE_TIME]
     variance = p[P_RATE_STD] * p[P_RATE_STD]
-    if p[P_EULER] > 0.0:
+    turn2 = x[RATE] * x[RATE] + x[RATE + 1] * x[RATE + 1] + x[RATE + 2] * x[RATE + 2]
+    if p[P_EULER] > 0.0 and turn2 * dt * dt < MAX_EULER * MAX_EULER:
         ew, ex, ey, ez = turned_since(x)
         turn_matrix(w, ew, ex, ey, ez)
         for i in range(12):

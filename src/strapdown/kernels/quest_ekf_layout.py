@@ -35,3 +35,6 @@ W_PH = W_HEAD + 63  # P h: 7
 W_SIZE = W_HEAD + 70
 
 MIN_SINE = 1e-3  # of the angle between field and vertical: nearer there is no heading
+
+# Beyond this turn per sample [rad] the printed first order says nothing: the exact one is taken.
+MAX_EULER = 0.5

@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike
 from strapdown._types import BoolArray, FloatArray
 
 UNIT_NORM_TOLERANCE = 1e-6  # a quaternion further off is not a rounded unit quaternion
+LARGEST = 1e75  # no quantity in SI comes near; the fourth power is still a number
 ROUND_OFF = 1e-15  # a quaternion just scaled to unit norm is off by less: about 3 eps
 
 
@@ -30,8 +31,10 @@ def as_floats(name: str, value: ArrayLike) -> FloatArray:
         value = np.ma.filled(value.astype(np.float64), np.nan)
     try:
         array = np.asarray(value)
-    except ValueError as error:  # rows of different length
-        raise ValueError(f"`{name}` must be a regular array of numbers, got {error}.") from None
+    except ValueError:
+        raise ValueError(
+            f"`{name}` must be a regular array of numbers, got rows of different length."
+        ) from None
     if array.dtype.kind not in "biuf":
         raise TypeError(f"`{name}` must hold real numbers, got dtype {array.dtype}.")
     # ascontiguousarray would make a scalar one-dimensional.
@@ -48,9 +51,18 @@ def _place(array_shape: tuple[int, ...], flat_index: int) -> str:
     return f" at index {index}"
 
 
-def _require_finite(name: str, array: FloatArray, item_ndim: int, *, allow_nan: bool) -> None:
+def _require_finite(
+    name: str,
+    array: FloatArray,
+    item_ndim: int,
+    *,
+    allow_nan: bool,
+    largest: float = np.finfo(np.float64).max,
+) -> None:
     """Refuse inf, and NaN too unless allowed, naming the first bad item."""
-    bad: BoolArray = np.isinf(array) if allow_nan else ~np.isfinite(array)
+    bad: BoolArray = np.abs(array) > largest  # False for NaN
+    if not allow_nan:
+        bad |= np.isnan(array)
     if not bad.any():
         return
     shape = array.shape[: array.ndim - item_ndim]
@@ -58,6 +70,8 @@ def _require_finite(name: str, array: FloatArray, item_ndim: int, *, allow_nan: 
     first = int(np.flatnonzero(items)[0])
     got = " ".join(str(array.reshape(-1, *array.shape[len(shape) :])[first]).split())
     must = "finite or NaN" if allow_nan else "finite"
+    if np.isfinite(array[bad]).all():
+        must += f" and below {largest:g} in size"
     raise ValueError(f"`{name}` must be {must}, got {got}{_place(shape, first)}.")
 
 
@@ -71,7 +85,7 @@ def as_samples(
     array = as_floats(name, value)
     if array.ndim != 2 or array.shape[1] != width:
         raise ValueError(f"`{name}` must have shape (n, {width}), got {array.shape}.")
-    _require_finite(name, array, 1, allow_nan=allow_nan)
+    _require_finite(name, array, 1, allow_nan=allow_nan, largest=LARGEST)
     return array
 
 
@@ -84,7 +98,7 @@ def as_series(
         raise ValueError(
             f"`{name}` must have shape ({'n' if n is None else n},), got {array.shape}."
         )
-    _require_finite(name, array, 0, allow_nan=allow_nan)
+    _require_finite(name, array, 0, allow_nan=allow_nan, largest=LARGEST)
     return array
 
 
@@ -95,7 +109,7 @@ def as_vector(
     array = as_floats(name, value)
     if array.shape != (size,):
         raise ValueError(f"`{name}` must have shape ({size},), got {array.shape}.")
-    _require_finite(name, array, 1, allow_nan=allow_nan)
+    _require_finite(name, array, 1, allow_nan=allow_nan, largest=LARGEST)
     return array
 
 
@@ -179,16 +193,40 @@ def finite(name: str, value: Any) -> float:
     out = _as_float(name, value)
     if not math.isfinite(out):
         raise ValueError(f"`{name}` must be finite, got {value!r}.")
-    return out
+    return _of_a_size(name, out)
 
 
-def positive(name: str, value: Any, *, allow_zero: bool = False) -> float:
-    """Return `value` as a finite float greater than zero, or not negative."""
+def positive(name: str, value: Any, *, allow_zero: bool = False, allow_inf: bool = False) -> float:
+    """Return `value` as a finite float greater than zero, or not negative, or infinite."""
     out = _as_float(name, value)
+    if allow_inf and out == math.inf:
+        return out
     if not (math.isfinite(out) and (out >= 0.0 if allow_zero else out > 0.0)):
         kind = "non-negative" if allow_zero else "positive"
-        raise ValueError(f"`{name}` must be {kind} and finite, got {value!r}.")
-    return out
+        kind += "" if allow_inf else " and finite"
+        raise ValueError(f"`{name}` must be {kind}, got {value!r}.")
+    return _of_a_size(name, out)
+
+
+def _of_a_size(name: str, value: float) -> float:
+    """Refuse what is so large or small that its square is infinite or zero."""
+    if value != 0.0 and not 1.0 / LARGEST <= abs(value) <= LARGEST:
+        raise ValueError(
+            f"`{name}` must be between {1.0 / LARGEST:g} and {LARGEST:g} in size, got {value!r}."
+        )
+    return value
+
+
+def same_shape(**arrays: FloatArray) -> None:
+    """Refuse arrays that do not broadcast."""
+    try:
+        np.broadcast_shapes(*(array.shape for array in arrays.values()))
+    except ValueError:
+        names = " and ".join(f"`{name}`" for name in arrays)
+        found = " and ".join(str(array.shape) for array in arrays.values())
+        raise ValueError(
+            f"{names} must have equal or broadcastable shapes, got {found}."
+        ) from None
 
 
 def in_range(name: str, value: Any, low: float, high: float) -> float:
@@ -235,6 +273,25 @@ def instance(name: str, value: Any, cls: type, way_out: str = "") -> None:
     if not isinstance(value, cls):
         hint = f"; {way_out}" if way_out else ""
         raise TypeError(f"`{name}` must be a {cls.__name__}, got {type(value).__name__}{hint}.")
+
+
+def instances(name: str, values: Any, cls: type) -> list[Any]:
+    """Return `values` as a list, all of it of `cls`."""
+    try:
+        found = list(values)
+    except TypeError:
+        raise TypeError(
+            f"`{name}` must be a sequence of {cls.__name__}, got {type(values).__name__}."
+        ) from None
+    for k, value in enumerate(found):
+        instance(f"{name}[{k}]", value, cls)
+    return found
+
+
+def call(name: str, value: Any) -> None:
+    """Refuse what cannot be called."""
+    if not callable(value):
+        raise TypeError(f"`{name}` must be a function, got {type(value).__name__}.")
 
 
 def recording(name: str, value: Any) -> None:

@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from strapdown._checks import as_floats, as_vector, as_vectors, finite
+from strapdown._checks import LARGEST, as_floats, as_vector, as_vectors, finite, same_shape
 from strapdown._types import FloatArray
 from strapdown.constants import (
     GAMMA_E,
@@ -228,6 +228,7 @@ def transport_rate_n(lla: ArrayLike, v_n: ArrayLike) -> FloatArray:
             "`lla` must not be a pole, where NED has no north and turns infinitely fast; "
             "navigate in ECEF or with a wander azimuth there."
         )
+    same_shape(lla=lat, v_n=v[..., 0])
     north = v[..., 0] / (meridian_radius(lat) + height)
     east = v[..., 1] / (transverse_radius(lat) + height)
     return np.stack((east, -north, -east * np.tan(lat)), axis=-1)
@@ -262,10 +263,12 @@ def normal_gravity(lat: ArrayLike, height: ArrayLike = 0.0) -> FloatArray:
     >>> round(float(normal_gravity(45 * DEG)), 5)
     9.8062
     """
-    s2 = np.sin(_latitude("lat", lat)) ** 2
-    h = as_floats("height", height) / WGS84_A
-    if np.isinf(h).any():
+    latitude, above = _latitude("lat", lat), as_floats("height", height)
+    if (np.abs(above) > LARGEST).any():
         raise ValueError("`height` must be finite or NaN, got inf.")
+    same_shape(lat=latitude, height=above)
+    s2 = np.sin(latitude) ** 2
+    h = above / WGS84_A
     surface = GAMMA_E * (1.0 + SOMIGLIANA_K * s2) / np.sqrt(1.0 - WGS84_E2 * s2)
     linear = 2.0 * (1.0 + WGS84_F + SOMIGLIANA_M - 2.0 * WGS84_F * s2)
     return np.asarray(surface * (1.0 - (linear - 3.0 * h) * h))

@@ -21,7 +21,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from strapdown._checks import as_samples, as_times, positive, same_length
+from strapdown._checks import (
+    as_floats,
+    as_samples,
+    as_times,
+    instance,
+    positive,
+    same_length,
+)
 from strapdown._types import BoolArray, FloatArray, IntArray
 from strapdown.units import DPS
 
@@ -66,8 +73,7 @@ class RestTest:
         positive("factor", self.factor)
         positive("max_gyr_std", self.max_gyr_std)
         positive("max_acc_std", self.max_acc_std)
-        if not self.max_rate > 0.0:
-            raise ValueError(f"`max_rate` must be positive, got {self.max_rate}.")
+        positive("max_rate", self.max_rate, allow_inf=True)
         positive("min_duration", self.min_duration, allow_zero=True)
 
 
@@ -126,7 +132,7 @@ def rest_mask(t: ArrayLike, gyr: ArrayLike, acc: ArrayLike, test: RestTest = DEF
     -----
     Offline: the window is centred, and the noise floor is the first percentile over the log.
     """
-    t, gyr, acc = _checked(t, gyr, acc)
+    t, gyr, acc = _checked(t, gyr, acc, test)
     half = 0.5 * test.window
     low = np.searchsorted(t, t - half, side="left")
     high = np.searchsorted(t, t + half, side="right")
@@ -164,7 +170,7 @@ def rest_mask_causal(
     Online: the noise floor is the quietest full window so far. Until a log has rested once,
     its floor is too high and only `max_gyr_std`, `max_acc_std` and `max_rate` hold.
     """
-    t, gyr, acc = _checked(t, gyr, acc)
+    t, gyr, acc = _checked(t, gyr, acc, test)
     low = np.searchsorted(t, t - test.window, side="left")
     high = np.arange(1, len(t) + 1)
     gyr_mean, gyr_std = _windowed(gyr, low, high)
@@ -197,7 +203,9 @@ def segments(
         In order of time.
     """
     t = as_times("t", t)
-    inside = np.asarray(mask, dtype=np.bool_)
+    positive("min_duration", min_duration, allow_zero=True)
+    positive("max_gap", max_gap, allow_inf=True)
+    inside = as_floats("mask", mask) != 0.0
     if inside.shape != t.shape:
         raise ValueError(f"`mask` must have shape {t.shape}, got {inside.shape}.")
     if not inside.any():
@@ -240,8 +248,9 @@ def rest_segments(
 
 
 def _checked(
-    t: ArrayLike, gyr: ArrayLike, acc: ArrayLike
+    t: ArrayLike, gyr: ArrayLike, acc: ArrayLike, test: RestTest
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
+    instance("test", test, RestTest)
     gyr = as_samples("gyr", gyr, allow_nan=True)
     acc = as_samples("acc", acc, allow_nan=True)
     return as_times("t", t, same_length(gyr=gyr, acc=acc)), gyr, acc

@@ -19,7 +19,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from strapdown._checks import as_floats, as_matrices, as_quats, as_series, as_times, as_vectors
+from strapdown._checks import (
+    as_floats,
+    as_matrices,
+    as_quats,
+    as_series,
+    as_times,
+    as_vectors,
+    instance,
+    same_shape,
+)
 from strapdown._types import FloatArray
 
 if TYPE_CHECKING:
@@ -145,8 +154,9 @@ def quat_from_dcm(C_nb: ArrayLike) -> FloatArray:
         If a matrix is not a rotation; `nearest_dcm` gives the nearest one.
     """
     C = as_matrices("C_nb", C_nb, allow_nan=True)
-    off = np.abs(np.swapaxes(C, -1, -2) @ C - np.eye(3)).max(axis=(-1, -2), initial=0.0)
-    if (off > DCM_TOLERANCE).any():
+    with np.errstate(over="ignore", invalid="ignore"):  # huge entries are no rotation either
+        off = np.abs(np.swapaxes(C, -1, -2) @ C - np.eye(3)).max(axis=(-1, -2), initial=0.0)
+    if (off > DCM_TOLERANCE).any() or (np.isnan(off) & np.isfinite(C).all(axis=(-1, -2))).any():
         raise ValueError(
             f"`C_nb` must be orthonormal within {DCM_TOLERANCE:g}, got C^T C off by "
             f"{np.nanmax(off):.3g}; `nearest_dcm` gives the nearest rotation."
@@ -355,6 +365,9 @@ def scipy_from_quat(q_nb: ArrayLike) -> "Rotation":
 
 def quat_from_scipy(rotation: "Rotation") -> FloatArray:
     """Return ``q_nb``, with ``w >= 0``, of a SciPy `Rotation` that takes b to n."""
+    from scipy.spatial.transform import Rotation
+
+    instance("rotation", rotation, Rotation)
     return _canonical(np.roll(np.asarray(rotation.as_quat(), dtype=np.float64), 1, axis=-1))
 
 
@@ -386,6 +399,7 @@ def slerp(q_a: ArrayLike, q_b: ArrayLike, fraction: ArrayLike) -> FloatArray:
     part = as_floats("fraction", fraction)
     if np.isinf(part).any():
         raise ValueError("`fraction` must be finite or NaN, got inf.")
+    same_shape(q_a=a[..., 0], q_b=b[..., 0], fraction=part)
     step = rotvec_from_quat(_renormalized(_mul(a * (1.0, -1.0, -1.0, -1.0), b)))
     half = 0.5 * np.linalg.norm(step, axis=-1) * part
     turn = np.concatenate(

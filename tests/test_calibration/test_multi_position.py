@@ -198,7 +198,10 @@ def test_poses_on_one_side_have_a_large_sigma():
 def test_poses_about_one_axis_are_refused_naming_what_they_cannot_tell():
     angle = np.linspace(0, 2 * np.pi, 20, endpoint=False)
     flat = G * np.column_stack((np.cos(angle), np.sin(angle), np.zeros(20)))
-    with pytest.raises(InputError, match="cannot tell s_z from these data; spread the poses"):
+    with pytest.raises(
+        InputError,
+        match="cannot tell b_z, s_z, theta_zx and theta_zy from these data; spread the poses",
+    ):
         cal.accelerometer_from_poses(flat)
 
 

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from strapdown._checks import same_length
+from strapdown._checks import positive, same_length
 from strapdown._types import FloatArray
 from strapdown.calibration.least_squares import gauss_newton
 from strapdown.calibration.record import require_poses, rms
@@ -92,6 +92,7 @@ def align_to_accelerometer(mag: ArrayLike, acc: ArrayLike, *, limit: float = LIM
     start = _nearest_axes(m, f)
     m = m @ start.T
     # At rest f points up, so f . m is minus the sine of the inclination.
+    positive("limit", limit)
     solution = gauss_newton(
         lambda x: _model(x, m, f),
         np.append(np.zeros(3), -float(np.mean(np.einsum("ij,ij->i", f, m)))),

@@ -16,7 +16,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.interpolate import BSpline, splrep
 
-from strapdown._checks import as_samples, as_series, as_times, as_vector, positive, whole
+from strapdown._checks import (
+    as_floats,
+    as_samples,
+    as_series,
+    as_times,
+    as_vector,
+    positive,
+    whole,
+)
 from strapdown._types import FloatArray, IntArray
 from strapdown.errors import InputError
 from strapdown.rotation import dcm_from_rpy
@@ -75,7 +83,7 @@ def decode_quadrature(a: ArrayLike, b: ArrayLike, cycles_per_turn: int = 500) ->
     """
     levels = []
     for name, value in (("a", a), ("b", b)):
-        level = np.asarray(value)
+        level = as_floats(name, value)
         if level.ndim != 1 or not np.isin(level, (0, 1)).all():
             raise ValueError(f"`{name}` must be levels 0 and 1 of shape (n,), got {level!r}.")
         levels.append(level.astype(np.int64))
@@ -113,7 +121,7 @@ def start_offset(angle: ArrayLike, *, least_travel: float = 20.0 * DEG) -> float
     float
         Offset [rad].
     """
-    angle = as_series("angle", angle)
+    angle, least_travel = as_series("angle", angle), positive("least_travel", least_travel)
     travel = float(np.ptp(angle)) if len(angle) else 0.0
     if not travel >= least_travel:
         raise InputError(

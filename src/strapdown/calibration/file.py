@@ -105,7 +105,7 @@ def save(calibration: Iterable[Fit], path: str | PathLike[str]) -> None:
     document.add(tomlkit.comment("corrected = matrix @ (raw - bias); see `strapdown calibrate`"))
     document["type"] = FILE_TYPE
     document["format_version"] = FORMAT_VERSION
-    _write(document, calibration, Path(path))
+    _write(document, _records("calibration", calibration), Path(path))
 
 
 def merge_into(
@@ -126,13 +126,25 @@ def merge_into(
     -------
     Calibration
     """
-    file, fits = Path(path), tuple(fits)
+    file, fits = Path(path), _records("fits", fits)
     if not file.exists():
         save(fits, file)
         return Calibration().merge(fits)
     merged = load(file, convert_units=convert_units).merge(fits)
     _write(tomlkit.parse(file.read_text(encoding="utf-8")), fits, file)
     return merged
+
+
+def _records(name: str, fits: Iterable[Fit]) -> tuple[Fit, ...]:
+    """Return the records, refusing what is none."""
+    found = tuple(fits) if isinstance(fits, Iterable) else (fits,)
+    for fit in found:
+        if not isinstance(fit, CalibrationRecord | TemperatureRecord):
+            raise TypeError(
+                f"`{name}` must hold calibration records, got {type(fit).__name__}; "
+                "the calibrating functions return them."
+            )
+    return found
 
 
 # --- writing ----------------------------------------------------------------------------

@@ -161,8 +161,10 @@ def _step(
     Q, R = np.linalg.qr(jacobian * scale)
     left, singular, right = np.linalg.svd(R)
     if singular[-1] <= RANK_TOLERANCE * singular[0]:
-        weights = np.abs(right[-1])
+        unseen = right[singular <= RANK_TOLERANCE * singular[0]]  # any basis of one space
+        weights = np.sqrt((unseen * unseen).sum(axis=0))
         blurred = [name for name, w in zip(names, weights, strict=True) if w > 0.3 * weights.max()]
-        raise InputError(f"{what} cannot tell {' and '.join(blurred)} from these data; {advice}.")
+        listed = " and ".join([", ".join(blurred[:-1])] * (len(blurred) > 1) + blurred[-1:])
+        raise InputError(f"{what} cannot tell {listed} from these data; {advice}.")
     step = -scale * (right.T @ ((left.T @ (Q.T @ residuals)) / singular))
     return step, singular, right

@@ -35,7 +35,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from strapdown._checks import as_samples, as_series, one_of, positive
+from strapdown._checks import as_samples, as_series, as_vector, one_of, positive
 from strapdown._types import FloatArray
 from strapdown.calibration.least_squares import MAX_ITERATIONS, Solution, gauss_newton
 from strapdown.calibration.record import (
@@ -59,7 +59,7 @@ _ADVICE = "spread the poses over the whole sphere, each axis up, down and tilted
 
 def distortion_matrix(x: ArrayLike) -> FloatArray:
     """Return S of the nine parameters, in the order of `NAMES`."""
-    _, _, _, s_x, s_y, s_z, theta_yz, theta_zx, theta_zy = np.asarray(x, dtype=np.float64)
+    _, _, _, s_x, s_y, s_z, theta_yz, theta_zx, theta_zy = as_vector("x", x, 9)
     # fmt: off
     return np.array([
         [1.0 + s_x,        0.0,       0.0],
@@ -167,6 +167,7 @@ def gyro_from_rate_table(
     """
     means = as_samples("means", means)
     references = np.abs(as_series("rates", rates, len(means)))
+    one_of("variant", variant, ("exact", "thesis"))
     if variant == "thesis" and not references.all():
         raise InputError("`rates` must not be zero in the variant 'thesis'; leave such rows out.")
     return _calibrate("gyr", means, references, std, variant, tolerances, about)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from strapdown import motion
-from strapdown._checks import as_samples, as_times, positive, same_length
+from strapdown._checks import as_samples, as_times, instance, positive, same_length
 from strapdown._types import FloatArray, IntArray
 from strapdown.calibration.sphere import unit_vectors
 from strapdown.units import DEG, DPS
@@ -99,10 +99,12 @@ def find_poses(
     acc = as_samples("acc", acc, allow_nan=True)
     same_length(t=t, gyr=gyr, acc=acc)
     positive("wander", wander)
+    positive("loosest", loosest, allow_inf=True)
+    instance("rest", rest, motion.RestTest)
     tried = [
         _pose_segments(t, gyr, acc, replace(rest, factor=k * rest.factor), wander)
         for k in _LOOSENESS
-        if k <= loosest
+        if k <= max(loosest, 1.0)
     ]
     # Most orientations; then the fewest interruptions; then the strictest.
     joined = max(tried, key=lambda poses: (_distinct(acc, poses), -sum(map(len, poses))))

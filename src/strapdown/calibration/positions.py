@@ -25,7 +25,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from strapdown._checks import as_floats, as_samples, positive
+from strapdown._checks import as_floats, as_samples, positive, same_shape
 from strapdown._types import FloatArray, IntArray
 from strapdown.calibration.multi_position import accelerometer_from_poses
 from strapdown.calibration.record import CalibrationRecord
@@ -56,6 +56,7 @@ def up_down(up: ArrayLike, down: ArrayLike, magnitude: float) -> tuple[FloatArra
         S, without unit.
     """
     up, down = as_floats("up", up), as_floats("down", down)
+    same_shape(up=up, down=down)
     K = positive("magnitude", magnitude)
     return 0.5 * (up + down), (up - down - 2.0 * K) / (2.0 * K)
 

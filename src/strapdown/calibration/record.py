@@ -244,7 +244,9 @@ class CalibrationRecord(Fit):
         if raw.shape[-1:] != (3,):
             raise ValueError(f"`samples` must have shape (..., 3), got {raw.shape}.")
         offset = self.bias if bias is None else as_floats("bias", bias)
-        return np.asarray((raw - offset) @ self.matrix.T)
+        x, y, z = np.moveaxis(np.asarray(raw - offset), -1, 0)
+        # Not a matrix product, whose rounding depends on how many samples there are.
+        return np.stack([m[0] * x + m[1] * y + m[2] * z for m in self.matrix], axis=-1)
 
     def distort(self, samples: ArrayLike) -> FloatArray:
         """Return the raw samples that `correct` would take to these; its inverse."""

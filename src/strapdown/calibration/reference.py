@@ -29,7 +29,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from strapdown._checks import as_samples, one_of, same_length
+from strapdown._checks import as_matrices, as_samples, as_vector, one_of, same_length
 from strapdown._types import FloatArray
 from strapdown.calibration.least_squares import correlation_length
 from strapdown.calibration.record import (
@@ -163,11 +163,16 @@ def physical_parameters(matrix: ArrayLike, bias: ArrayLike) -> FloatArray:
 
     Equations (6.11)-(6.12) with ``matrix = T inv(K)``.
     """
-    b = np.asarray(matrix, dtype=np.float64)
+    b = as_matrices("matrix", matrix)
+    offset = as_vector("bias", bias)
+    if b.ndim != 2 or not np.diag(b).all():
+        raise ValueError(
+            f"`matrix` must have shape (3, 3) and no zero on its diagonal, got {b.tolist()}."
+        )
     k_x, k_y, k_z = 1.0 / np.diag(b)
     return np.array(
         [
-            k_x, k_y, k_z, *np.asarray(bias, dtype=np.float64),
+            k_x, k_y, k_z, *offset,
             -b[0, 1] * k_y, b[0, 2] * k_z,
             b[1, 0] * k_x, -b[1, 2] * k_z,
             -b[2, 0] * k_x, b[2, 1] * k_y,
@@ -177,9 +182,10 @@ def physical_parameters(matrix: ArrayLike, bias: ArrayLike) -> FloatArray:
 
 def correction_from_physical(parameters: ArrayLike) -> tuple[FloatArray, FloatArray]:
     """Return matrix and bias of twelve physical parameters; undoes `physical_parameters`."""
-    k_x, k_y, k_z, b_x, b_y, b_z, a_yz, a_zy, a_xz, a_zx, a_xy, a_yx = np.asarray(
-        parameters, dtype=np.float64
-    )
+    values = as_vector("parameters", parameters, 12)
+    k_x, k_y, k_z, b_x, b_y, b_z, a_yz, a_zy, a_xz, a_zx, a_xy, a_yx = values
+    if not values[:3].all():
+        raise ValueError(f"`parameters` must have scale factors, got {values[:3]}.")
     T = np.array([[1.0, -a_yz, a_zy], [a_xz, 1.0, -a_zx], [-a_xy, a_yx, 1.0]])
     return T / [k_x, k_y, k_z], np.array([b_x, b_y, b_z])
 

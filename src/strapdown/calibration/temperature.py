@@ -16,7 +16,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from strapdown._checks import as_samples, as_series, as_times, one_of, positive, same_length
+from strapdown._checks import (
+    as_samples,
+    as_series,
+    as_times,
+    finite,
+    instance,
+    one_of,
+    positive,
+    same_length,
+)
 from strapdown._types import FloatArray
 from strapdown.calibration.least_squares import correlation_length
 from strapdown.calibration.record import (
@@ -134,7 +143,8 @@ def require_rest(t: ArrayLike, mask: ArrayLike, what: str, *, longest: float = 2
         Longest movement that is put up with [s].
     """
     t = as_times("t", t)
-    moving = ~np.asarray(mask, dtype=np.bool_)
+    positive("longest", longest, allow_zero=True)
+    moving = as_series("mask", mask, len(t)) == 0.0
     edges = np.flatnonzero(np.diff(np.concatenate(([False], moving, [False])).astype(np.int8)))
     for start, stop in zip(edges[::2], edges[1::2], strict=True):
         if t[stop - 1] - t[start] > longest:
@@ -161,6 +171,8 @@ def slope_matters(record: TemperatureRecord, change_degc: float, bias_limit: flo
     bool
         True if any axis moves by more and its slope exceeds twice its standard deviation.
     """
+    instance("record", record, TemperatureRecord)
+    change_degc, bias_limit = finite("change_degc", change_degc), finite("bias_limit", bias_limit)
     slope: FloatArray = np.abs(record.slope)
     std = np.array([p.std for p in record.parameters[:3]])
     return bool(np.any((slope * change_degc > bias_limit) & (slope > 2.0 * std)))

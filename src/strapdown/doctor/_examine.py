@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from strapdown._checks import as_vector, in_range, one_of, recording
+from strapdown._checks import as_floats, as_vector, in_range, one_of, recording
 from strapdown._types import BoolArray
 from strapdown.doctor import _axes, _field, _fixes, _health, _scales, _time
 from strapdown.doctor._finding import Finding, Severity, worst_first
@@ -83,7 +83,13 @@ def examine(
 
 def _placed(log: Log, place: Sequence[float]) -> Log:
     """Return the log with a place in its metadata, which outranks its fixes."""
-    point = as_vector("place", [*place, 0.0][:3])
+    point = as_floats("place", place)
+    if point.shape not in ((2,), (3,)):
+        raise ValueError(
+            "`place` must be latitude and longitude, and height if known, "
+            f"got shape {point.shape}."
+        )
+    point = as_vector("place", [*point, 0.0][:3])
     in_range("place[0]", float(point[0]), -0.5 * np.pi, 0.5 * np.pi)
     names = ("lat_rad", "lon_rad", "height_m")
     return replace(log, meta={**log.meta, **dict(zip(names, point.tolist(), strict=True))})

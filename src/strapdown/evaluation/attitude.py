@@ -266,6 +266,7 @@ def mount_at(mount: MountReference, t: FloatArray) -> FloatArray | None:
     A mount hardly changes: between its valid samples it is interpolated however far they lie
     apart, before the first and after the last it is held.
     """
+    _checks.instance("mount", mount, MountReference)
     known = mount.rows(_valid(mount))
     if not len(known):
         return None

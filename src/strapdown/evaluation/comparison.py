@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from strapdown._checks import instances
 from strapdown.errors import DataGap, InputError
 from strapdown.estimator import Estimator, entry
 from strapdown.evaluation.attitude import AttitudeErrors, attitude_errors
@@ -131,6 +132,7 @@ def means(table: Sequence[Trial]) -> list[dict[str, Any]]:
     list of dict
         ``filter``, ``logs``, ``ns_per_sample`` and the mean of every ``..._rmse_...``.
     """
+    table = instances("table", table, Trial)
     rows = []
     for label in dict.fromkeys(trial.label for trial in table):
         own = [trial for trial in table if trial.label == label]

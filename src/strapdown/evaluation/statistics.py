@@ -64,6 +64,9 @@ def robust_circular_mean(angle: FloatArray) -> float:
     float
         In (-pi, pi].
     """
+    angle = _checks.as_series("angle", angle)
+    if not angle.size:
+        raise ValueError("`angle` must hold at least one angle, got none.")
     start = np.arctan2(np.sin(angle).mean(), np.cos(angle).mean())
     start += np.median(wrap_pi(angle - start))
     rest = wrap_pi(angle - start)

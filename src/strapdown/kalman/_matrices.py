@@ -15,7 +15,7 @@ def vector(name: str, value: ArrayLike, size: int | None = None) -> FloatArray:
     if array.ndim != 1 or (size is not None and array.size != size):
         want = "(n,)" if size is None else f"({size},)"
         raise ValueError(f"`{name}` must have shape {want}, got {array.shape}.")
-    if not np.isfinite(array).all():
+    if not (np.abs(array) <= _checks.LARGEST).all():
         raise ValueError(f"`{name}` must be finite, got {array}.")
     return array
 
@@ -29,7 +29,7 @@ def matrix(
     if not fits or (columns is not None and array.shape[1] != columns):
         want = f"({'n' if rows is None else rows}, {'m' if columns is None else columns})"
         raise ValueError(f"`{name}` must have shape {want}, got {array.shape}.")
-    if not np.isfinite(array).all():
+    if not (np.abs(array) <= _checks.LARGEST).all():
         raise ValueError(f"`{name}` must be finite, got {array.tolist()}.")
     return array
 

@@ -6,6 +6,8 @@ from numpy.typing import ArrayLike
 from strapdown import _checks
 from strapdown._types import FloatArray
 
+_MOST = 10**9  # errors that anyone averages
+
 
 def nees(errors: ArrayLike, P: ArrayLike) -> FloatArray:
     """Normalised estimation error squared, ``e^T P^-1 e``.
@@ -40,6 +42,7 @@ def nees(errors: ArrayLike, P: ArrayLike) -> FloatArray:
             f"`P` must have shape (..., n, n) for errors of shape (..., n), got {cov.shape} and "
             f"{e.shape}."
         )
+    _checks.same_shape(errors=e[..., 0], P=cov[..., 0, 0])
     try:
         solved = np.linalg.solve(cov, e[..., None])[..., 0]
     except np.linalg.LinAlgError:
@@ -70,6 +73,11 @@ def nis(innovations: ArrayLike, S: ArrayLike) -> FloatArray:
     array([ 1., nan])
     """
     nu, cov = _checks.as_floats("innovations", innovations), _checks.as_floats("S", S)
+    if nu.ndim < 1 or cov.shape != (*nu.shape, nu.shape[-1]):
+        raise ValueError(
+            f"`S` must have shape (k, m, m) for innovations of shape (k, m), got {cov.shape} and "
+            f"{nu.shape}."
+        )
     seen = np.asarray(np.isfinite(nu).all(axis=-1))
     filled = np.where(seen[..., None, None], cov, np.eye(nu.shape[-1]))
     return np.where(seen, nees(np.where(seen[..., None], nu, 0.0), filled), np.nan)
@@ -99,8 +107,8 @@ def mean_bounds(dof: int, count: int, probability: float = 0.99) -> tuple[float,
     """
     from scipy.stats import chi2
 
-    _checks.whole("dof", dof, 1)
-    _checks.whole("count", count, 1)
+    _checks.whole("dof", dof, 1, _MOST)
+    _checks.whole("count", count, 1, _MOST)
     _checks.in_range("probability", probability, 0.0, 1.0)
     tail = 0.5 * (1.0 - probability)
     low, high = chi2.ppf([tail, 1.0 - tail], dof * count) / count

@@ -15,6 +15,8 @@ from strapdown import _checks
 from strapdown._types import FloatArray
 from strapdown.kalman import _matrices as _m
 
+_HIGHEST_ORDER = 1000  # of a series; far beyond what adds a digit
+
 
 def van_loan(
     F: ArrayLike, Q: ArrayLike, dt: float, *, G: ArrayLike | None = None
@@ -100,7 +102,7 @@ def transition(F: ArrayLike, dt: float, order: int | None = None) -> FloatArray:
     if order is None:
         return _expm(step)
     term = total = np.eye(len(step))
-    for k in range(1, _checks.whole("order", order, 0) + 1):
+    for k in range(1, _checks.whole("order", order, 0, _HIGHEST_ORDER) + 1):
         term = term @ step / k
         total = total + term
     return total
@@ -184,4 +186,8 @@ def _expm(matrix: FloatArray) -> FloatArray:
     """Return the matrix exponential."""
     from scipy.linalg import expm
 
-    return np.asarray(expm(matrix))
+    with np.errstate(over="ignore", invalid="ignore"):
+        found = np.asarray(expm(matrix))
+    if not np.isfinite(found).all():
+        raise ValueError("`F` and `dt` must be small enough for exp(F dt) to be a number.")
+    return found

@@ -12,6 +12,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
+from strapdown import _checks
 from strapdown._types import FloatArray
 from strapdown.kalman import _matrices as _m
 from strapdown.kalman.linear import (
@@ -51,7 +52,11 @@ def jacobian(f: Function, x: ArrayLike, step: float = 1e-6) -> FloatArray:
     array([[0., 2.],
            [0., 1.]])
     """
+    _checks.call("f", f)
+    _checks.positive("step", step)
     at = _m.vector("x", x)
+    if not at.size:
+        raise ValueError("`x` must hold at least one number, got none.")
     columns = []
     for i in range(at.size):
         d = np.zeros(at.size)
@@ -98,6 +103,7 @@ def extended_predict(
     >>> x, P.round(9)
     (array([1.]), array([[0.4]]))
     """
+    _checks.call("f", f)
     state = _m.vector("x", x)
     n = state.size
     step = _at(F, f, state, "F", n)
@@ -148,6 +154,7 @@ def extended_update(
     >>> found.x.round(2)
     array([3.53, 3.53])
     """
+    _checks.call("h", h)
     state = _m.vector("x", x)
     measured = _m.vector("z", z)
     m = measured.size

@@ -74,11 +74,11 @@ def observability(
     (1, [1.0, 0.0])
     """
     _checks.positive("tolerance", tolerance)
-    given: Any = F
-    if np.ndim(given) == 3:
+    given: Any = _checks.as_floats("F", F)
+    if given.ndim == 3:
         steps = [_m.square("F", one) for one in given]
         n = len(steps[0])
-        rows = [_m.matrix("H", one, columns=n) for one in np.asarray(H)]
+        rows = [_m.matrix("H", one, columns=n) for one in _checks.as_floats("H", H)]
         if len(rows) != len(steps):
             raise ValueError(
                 f"`H` must be as many as `F`, one per step, got {len(rows)} and {len(steps)}."

@@ -16,6 +16,8 @@ from strapdown._types import FloatArray
 from strapdown.kalman import _matrices as _m
 from strapdown.kalman.discretise import van_loan
 
+_MOST_AXES = 1000
+
 
 class NoiseModel(NamedTuple):
     """A noise ``H xi`` made by a linear filter of white noise, continuous or discrete.
@@ -91,7 +93,7 @@ def wiener(density: float, axes: int = 1, std: float = 0.0) -> NoiseModel:
     """
     q = _checks.positive("density", density, allow_zero=True) ** 2
     p = _checks.positive("std", std, allow_zero=True) ** 2
-    unit = np.eye(_checks.whole("axes", axes, 1))
+    unit = np.eye(_checks.whole("axes", axes, 1, _MOST_AXES))
     return NoiseModel(0.0 * unit, unit, unit, q * unit, p * unit)
 
 
@@ -121,7 +123,7 @@ def gauss_markov(std: float, tau: float, axes: int = 1) -> NoiseModel:
     """
     p = _checks.positive("std", std) ** 2
     rate = 1.0 / _checks.positive("tau", tau)
-    unit = np.eye(_checks.whole("axes", axes, 1))
+    unit = np.eye(_checks.whole("axes", axes, 1, _MOST_AXES))
     return NoiseModel(-rate * unit, unit, unit, 2.0 * rate * p * unit, p * unit)
 
 
@@ -199,6 +201,7 @@ def augment(
 
 def _require_rows(name: str, model: NoiseModel, count: int) -> None:
     """Refuse a noise of another number of components."""
+    _checks.instance(name, model, NoiseModel)
     if len(model.H) != count:
         raise ValueError(
             f"`{name}` must make {count} noises, one for each it is added to, got {len(model.H)}; "

@@ -92,6 +92,7 @@ def steady_state(
     >>> found.P_before.round(6), found.K.round(6), round(found.decay, 6)
     (array([[1.618034]]), array([[0.618034]]), 0.381966)
     """
+    _checks.positive("tolerance", tolerance)
     step = _m.square("Phi", Phi)
     n = len(step)
     rows = _m.matrix("H", H, columns=n)

@@ -24,7 +24,7 @@ from typing import Final, Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from strapdown._checks import as_series, in_range, one_of, positive
+from strapdown._checks import as_floats, as_series, in_range, one_of, positive, whole
 from strapdown._types import FloatArray, IntArray
 from strapdown.errors import InputError
 from strapdown.kernels import allan as _k
@@ -223,6 +223,9 @@ def default_taus(n: int, fs: float, kind: Kind = "oadev", per_decade: int = 10) 
     ndarray, shape (k,)
         Multiples of ``1 / fs`` [s].
     """
+    n, fs = whole("n", n, 0, 10**15), positive("fs", fs)
+    per_decade = whole("per_decade", per_decade, 1, 1_000_000)
+    one_of("kind", kind, KINDS)
     last = min(longest_factor(n, kind), max(n // 3, 1))
     if last < 1:
         raise InputError(
@@ -237,7 +240,7 @@ def averaging_factors(n: int, fs: float, taus: ArrayLike | None, kind: str) -> I
     if taus is None:
         wanted = default_taus(n, fs, kind)  # type: ignore[arg-type]
     else:
-        wanted = np.atleast_1d(as_series("taus", np.atleast_1d(np.asarray(taus))))
+        wanted = as_series("taus", np.atleast_1d(as_floats("taus", taus)))
     if wanted.size == 0:
         raise ValueError("`taus` must hold at least one averaging time, got none.")
     if wanted.min() < (1.0 - 1e-6) / fs:

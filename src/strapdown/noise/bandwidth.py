@@ -22,7 +22,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from strapdown._checks import as_series, positive, same_length
+from strapdown._checks import as_series, as_vector, instance, positive, same_length
 from strapdown._types import BoolArray, FloatArray, IntArray
 from strapdown.noise.spectrum import PowerDensity
 from strapdown.units import DPS, MS
@@ -131,11 +131,14 @@ def low_pass_study(
         for k, value in enumerate(values):
             positive(f"{name}[{k}]", value)
     dt = positive("dt", dt)
-    low, high = positive("rates[0]", rates[0]), positive("rates[1]", rates[1])
+    low, high = as_vector("rates", rates, 2).tolist()
+    positive("rates[0]", low)
     if not low < high:
         raise ValueError(f"`rates` must increase, got {low:g} and {high:g} rad/s.")
     omega = np.geomspace(low, high, _RATE_STEPS)
     sigmas = as_series("multiples", multiples)
+    if not (sigmas.size and (sigmas > 0.0).all()):
+        raise ValueError("`multiples` must hold positive numbers, at least one.")
     noise, lag = np.outer(sigmas, s) * dt, np.outer(omega, d)
     total = noise[:, np.newaxis] + lag  # (k, r, c)
     best = np.argmin(total, axis=2)
@@ -176,6 +179,7 @@ def sigma_behind_filter(spectrum: PowerDensity, cutoff_hz: ArrayLike) -> FloatAr
     What lies above half the record's sampling rate is taken as white, at the level of the
     upper half of the record's band: noise that sampling would fold, samples hold.
     """
+    instance("spectrum", spectrum, PowerDensity)
     cutoffs = as_series("cutoff_hz", cutoff_hz)
     for k, cutoff in enumerate(cutoffs):
         positive(f"cutoff_hz[{k}]", cutoff)

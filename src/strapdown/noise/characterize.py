@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from strapdown._checks import one_of, recording
+from strapdown._checks import instances, one_of, recording
 from strapdown._types import BoolArray, FloatArray
 from strapdown.errors import DataGap, InputError, MissingStream
 from strapdown.noise.allan import AllanDeviation, allan_deviation
@@ -142,7 +142,7 @@ def _wanted(rec: Recording, sensors: Iterable[str] | None) -> tuple[str, ...]:
                 "the recording must hold a gyroscope, an accelerometer or a magnetometer."
             )
         return tuple(there)
-    asked = [one_of("sensors", name, SENSOR_UNITS) for name in sensors]
+    asked = [one_of("sensors", name, SENSOR_UNITS) for name in instances("sensors", sensors, str)]
     for name in asked:
         if name not in there:
             raise MissingStream(

@@ -9,6 +9,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike
 
+from strapdown._checks import as_floats, finite, instance, one_of
 from strapdown._types import FloatArray
 
 SYMBOLS: Final = ("Q", "N", "B", "K", "R")
@@ -119,7 +120,7 @@ class Coefficients:
 
     def deviation(self, tau: ArrayLike) -> FloatArray:
         """Return the Allan deviation of all terms that have a value, together."""
-        times = np.asarray(tau, dtype=np.float64)
+        times = as_floats("tau", tau)
         total = np.zeros(times.shape)
         for c in self:
             if math.isfinite(c.value):
@@ -143,7 +144,10 @@ def line(symbol: str, value: float, tau: ArrayLike) -> FloatArray:
     -------
     ndarray
     """
-    times = np.asarray(tau, dtype=np.float64)
+    one_of("symbol", symbol, _TIME_POWER)
+    value, times = finite("value", value), as_floats("tau", tau)
+    if not (times > 0.0).all():
+        raise ValueError("`tau` must be positive, got a time that is not.")
     if symbol == "B":
         return np.asarray(np.full(times.shape, FLOOR * value))
     return np.asarray(value * (times / READ_AT[symbol]) ** SLOPES[symbol])
@@ -168,5 +172,7 @@ def coefficient_unit(symbol: str, unit: str) -> str:
     >>> coefficient_unit("N", "rad/s"), coefficient_unit("K", "rad/s")
     ('rad/s/sqrt(Hz)', 'rad/s*sqrt(Hz)')
     """
+    one_of("symbol", symbol, _TIME_POWER)
+    instance("unit", unit, str)
     tail = {1.0: "*s", 0.5: "/sqrt(Hz)", 0.0: "", -0.5: "*sqrt(Hz)", -1.0: "/s"}
     return unit + tail[_TIME_POWER[symbol]]

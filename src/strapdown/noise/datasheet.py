@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from enum import Enum, unique
 from typing import Final, Literal, get_args
 
-from strapdown._checks import one_of, positive
+from strapdown._checks import instance, instances, one_of, positive
 from strapdown.noise.coefficients import FLOOR, Coefficients, Status
 
 Kind = Literal["density", "random walk", "rms", "bias instability", "rate random walk"]
@@ -118,7 +118,11 @@ def compare(
     -------
     tuple of Comparison
     """
-    return tuple(_compare(measured, figure, std, bandwidth_hz) for figure in figures)
+    instance("measured", measured, Coefficients)
+    if bandwidth_hz is not None:
+        positive("bandwidth_hz", bandwidth_hz)
+    found = instances("figures", figures, Figure)
+    return tuple(_compare(measured, figure, std, bandwidth_hz) for figure in found)
 
 
 def _compare(

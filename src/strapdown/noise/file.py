@@ -15,7 +15,7 @@ import numpy as np
 import tomlkit
 from tomlkit.exceptions import ParseError
 
-from strapdown._checks import nearest
+from strapdown._checks import instance, nearest
 from strapdown.errors import FormatError
 from strapdown.io._atomic import written_aside
 from strapdown.noise.coefficients import (
@@ -53,6 +53,7 @@ def save(record: NoiseRecord, path: str | PathLike[str]) -> None:
     path : str or path
         The file; written aside and then renamed.
     """
+    instance("record", record, NoiseRecord)
     document = tomlkit.document()
     document.add(tomlkit.comment("noise at rest; N, B, K, R, Q are for two-sided densities"))
     document["type"] = FILE_TYPE

@@ -27,6 +27,7 @@ from typing import Final
 
 import numpy as np
 
+from strapdown._checks import instance
 from strapdown._types import BoolArray, FloatArray, IntArray
 from strapdown.noise.allan import AllanDeviation, local_slope
 from strapdown.noise.coefficients import (
@@ -64,6 +65,7 @@ def read_off(curve: AllanDeviation) -> Coefficients:
     ValueError
         If the curve is of another kind, whose levels differ.
     """
+    instance("curve", curve, AllanDeviation)
     if curve.kind not in ("adev", "oadev", "totdev"):
         raise ValueError(
             f"`curve` must be of kind adev, oadev or totdev, got {curve.kind!r}, "

@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from strapdown._checks import as_matrices, one_of, positive
+from strapdown._checks import as_matrices, instance, one_of, positive
 from strapdown._types import FloatArray
 from strapdown.errors import InputError, MissingStream
 from strapdown.noise.coefficients import Coefficient, Coefficients, Status
@@ -145,8 +145,10 @@ class NoiseRecord:
 
     def __post_init__(self) -> None:
         """Check that each entry is of its sensor."""
+        instance("sensors", self.sensors, Mapping)
         for name, noise in self.sensors.items():
             one_of("sensors", name, SENSOR_UNITS)
+            instance(f"sensors[{name!r}]", noise, SensorNoise)
             if noise.sensor != name:
                 raise ValueError(f"`sensors[{name!r}]` must be of {name}, got {noise.sensor}.")
 

@@ -14,7 +14,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from strapdown._checks import as_floats, as_samples, positive
+from strapdown._checks import LARGEST, as_floats, as_samples, positive, recording
 from strapdown._types import FloatArray, IntArray
 from strapdown.constants import G0
 from strapdown.errors import InputError, MissingStream
@@ -70,7 +70,7 @@ def static_statistics(samples: ArrayLike) -> StaticStatistics:
     values = as_floats("samples", samples)
     if values.ndim != 2:
         raise ValueError(f"`samples` must have shape (n, k), got {values.shape}.")
-    y = values[np.isfinite(values).all(axis=1)]
+    y = values[(np.abs(values) <= LARGEST).all(axis=1)]  # False for NaN
     n = len(y)
     if n < 2 * _BLOCKS:
         raise InputError(
@@ -112,6 +112,7 @@ def full_statistics(rec: Recording) -> StaticStatistics:
     MissingStream
         If there is no inertial sensor.
     """
+    recording("rec", rec)
     if rec.imu is None:
         raise MissingStream("the recording must have the stream 'imu' for a full covariance.")
     parts = np.column_stack((rec.imu.gyr, rec.imu.acc))
@@ -166,6 +167,8 @@ def zero_g(poses: Sequence[ArrayLike], gravity: float = G0) -> tuple[ZeroG, ...]
     """
     gravity = positive("gravity", gravity)
     found = []
+    if not isinstance(poses, Sequence | np.ndarray):
+        raise TypeError(f"`poses` must be a sequence of arrays, got {type(poses).__name__}.")
     for k, pose in enumerate(poses):
         acc = as_samples(f"poses[{k}]", pose) / gravity
         norm = np.linalg.norm(acc, axis=1)

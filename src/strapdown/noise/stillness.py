@@ -10,6 +10,7 @@ from typing import Final
 
 import numpy as np
 
+from strapdown._checks import as_floats, as_series, positive
 from strapdown._types import BoolArray, FloatArray
 from strapdown.errors import InputError
 
@@ -38,6 +39,9 @@ def require_signal(name: str, y: FloatArray) -> None:
     InputError
         Naming the value and how many samples have it.
     """
+    y = as_series(name, y)
+    if not y.size:
+        raise InputError(f"`{name}` must hold samples, got none.")
     low, high = float(y.min()), float(y.max())
     if low == high:
         raise InputError(
@@ -84,6 +88,10 @@ def moving(y: FloatArray, fs: float) -> BoolArray:
     ndarray of bool, shape (n,)
         All false in a record of fewer than eight windows, which has no usual window.
     """
+    y = as_floats("y", y)
+    if y.ndim not in (1, 2) or y.shape[-1] == 0:
+        raise ValueError(f"`y` must have shape (n,) or (n, k), got {y.shape}.")
+    fs = positive("fs", fs)
     samples = y[:, np.newaxis] if y.ndim == 1 else y
     width = max(_LEAST_WINDOW, round(_WINDOW * fs))
     count = len(samples) // width

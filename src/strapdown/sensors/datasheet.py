@@ -142,7 +142,6 @@ def _factor(unit: str) -> float:
     return parse_unit(unit.lower()).factor
 
 
-@lru_cache(maxsize=32)
 def datasheet(name: str) -> Datasheet:
     """Return the datasheet of a preset.
 
@@ -151,7 +150,11 @@ def datasheet(name: str) -> Datasheet:
     ValueError
         If there is none of this name; the nearest one is offered.
     """
-    _checks.one_of("name", name, datasheet_names())
+    return _datasheet(_checks.one_of("name", name, datasheet_names()))
+
+
+@lru_cache(maxsize=32)
+def _datasheet(name: str) -> Datasheet:
     text = (files("strapdown.sensors") / "datasheets" / f"{name}.toml").read_text("utf-8")
     table = tomllib.loads(text)
     figures = tuple(

@@ -39,7 +39,7 @@ class Digital:
     def __post_init__(self) -> None:
         """Check the values."""
         _checks.positive("lsb", self.lsb, allow_zero=True)
-        if not self.full_scale > self.lsb:
+        if not _checks.positive("full_scale", self.full_scale, allow_inf=True) > self.lsb:
             raise ValueError(
                 f"`full_scale` must be greater than `lsb`, got {self.full_scale!r} "
                 f"and {self.lsb!r}."

@@ -76,6 +76,7 @@ class GnssFix:
         for name in ("latency", "outage", "heading_from"):
             _checks.positive(name, getattr(self, name), allow_zero=True)
         _checks.positive("wander_time", self.wander_time)
+        _checks.instance("sampling", self.sampling, Sampling)
         _checks.in_range("outage_every", self.outage_every, max(self.outage, 1e-9), np.inf)
         if self.sampling.bandwidth or self.sampling.average:
             raise ValueError("`sampling` of a GNSS fix must have no low-pass and no mean.")
@@ -159,6 +160,7 @@ class StarTracker:
         """Check the values."""
         if (_checks.as_vector("std", self.std) < 0.0).any():
             raise ValueError(f"`std` must be non-negative, got {self.std}.")
+        _checks.instance("sampling", self.sampling, Sampling)
         if self.sampling.bandwidth or self.sampling.average:
             raise ValueError("`sampling` of a star tracker must have no low-pass and no mean.")
 

@@ -72,7 +72,12 @@ class Spread:
         """Check that nothing is negative."""
         for name in ("scale", "misalignment", "bias", "nonlinearity"):
             _checks.positive(name, getattr(self, name), allow_zero=True)
-        if self.non_orthogonality != math.inf:
+        if (
+            _checks.positive(
+                "non_orthogonality", self.non_orthogonality, allow_zero=True, allow_inf=True
+            )
+            < math.inf
+        ):
             limit = 2.0 * self.misalignment
             _checks.in_range("non_orthogonality", self.non_orthogonality, 0.0, limit)
 

@@ -27,6 +27,7 @@ from strapdown.units import DEG, DPS, MG, UT
 
 PLACE = (48.1374 * DEG, 11.5755 * DEG, 520.0)  # Munich
 EPOCH_UTC = "2026-03-20T12:00:00Z"
+_MOST = 10**8  # samples
 REST = 4.0  # seconds of rest at either end
 RAMP = 2.0  # seconds that the motion takes to set in
 
@@ -84,7 +85,8 @@ def truth(duration: float = 60.0, rate: float = 100.0) -> Truth:
     shortest = 2.0 * (REST + RAMP)
     if duration < shortest:
         raise ValueError(f"`duration` must be at least {shortest:g} s, got {duration:g}.")
-    return _truth(np.arange(round(duration * rate) + 1) / rate, duration)
+    samples = _checks.whole("duration * rate", round(duration * rate), 1, _MOST)
+    return _truth(np.arange(samples + 1) / rate, duration)
 
 
 def recording(
@@ -114,6 +116,8 @@ def recording(
         others what is there at the sample.
     """
     chip = SensorErrors() if errors is None else errors
+    _checks.instance("errors", chip, SensorErrors)
+    seed = _checks.whole("seed", seed, 0)
     exact = truth(duration, rate)
     t, n = exact.t, len(exact.t)
     # Simpson's rule over each interval: off by 1e-9 rad/s at 100 Hz

@@ -118,6 +118,11 @@ def truth(
     array([[ 0.   ,  0.   , -9.805],
            [ 0.   ,  0.   , -9.805]])
     """
+    if not callable(getattr(motion, "pose", None)):
+        raise TypeError(
+            f"`motion` must be a motion with a method `pose`, got {type(motion).__name__}; "
+            "`simulation.motions` has some."
+        )
     times, origin = as_times("t", t), as_vector("place", place)
     mount = as_quats("q_vb", q_vb)
     if np.cos(origin[0]) < 1e-6:

@@ -235,11 +235,13 @@ class HandMoved:
     def __post_init__(self) -> None:
         """Check the terms and times."""
         for name in ("roll", "pitch", "yaw", "north", "east", "down"):
-            if getattr(self, name):
+            if _checks.as_floats(name, getattr(self, name)).size:
                 terms = _checks.as_samples(name, getattr(self, name))
                 for period in terms[:, 1]:
                     _checks.positive(f"period in {name}", period)
         _checks.positive("ramp", self.ramp)
+        _checks.positive("rest", self.rest, allow_zero=True)
+        _checks.positive("moving", self.moving)
         if self.moving < 2.0 * self.ramp:
             raise ValueError(
                 f"`moving` must be at least two ramps of {self.ramp:g} s, got {self.moving:g}."
@@ -279,7 +281,9 @@ class Waypoints:
         t = _checks.as_times("times", self.times)
         for name in ("points", "rpy"):
             rows = getattr(self, name)
-            if (rows or name == "points") and len(_checks.as_samples(name, rows)) != len(t):
+            if (_checks.as_floats(name, rows).size or name == "points") and len(
+                _checks.as_samples(name, rows)
+            ) != len(t):
                 raise ValueError(
                     f"`{name}` must have one row per time, got {len(rows)} and {len(t)}."
                 )
@@ -289,7 +293,7 @@ class Waypoints:
     def pose(self, t: FloatArray) -> Pose:
         """Return the pose at times of any order."""
         knots, points = np.array(self.times), np.array(self.points)
-        rpy = np.array(self.rpy) if self.rpy else np.zeros((len(knots), 3))
+        rpy = np.array(self.rpy) if np.size(self.rpy) else np.zeros((len(knots), 3))
         north, east, down = (jet_of(spline(knots, points[:, k]), t, 2) for k in range(3))
         roll, pitch, yaw = (jet_of(spline(knots, rpy[:, k]), t, 2) for k in range(3))
         return Pose((north, east, down), quat_from_angles(roll, pitch, yaw))

@@ -57,7 +57,8 @@ class Drive:
 
     def __post_init__(self) -> None:
         """Check the track."""
-        points = _checks.as_samples("points", self.points if self.points else np.empty((0, 3)))
+        given = _checks.as_floats("points", self.points)
+        points = _checks.as_samples("points", given if given.size else np.empty((0, 3)))
         if len(points) < 8:
             raise ValueError(f"`points` must hold at least eight points, got {len(points)}.")
         if (np.linalg.norm(np.diff(points, axis=0), axis=1) == 0.0).any():
@@ -65,9 +66,10 @@ class Drive:
         _checks.positive("speed", self.speed)
         _checks.positive("acceleration", self.acceleration)
         _checks.positive("rest", self.rest, allow_zero=True)
-        if list(self.stops) != sorted(set(self.stops)):
-            raise ValueError(f"`stops` must increase, got {self.stops}.")
-        for stop in self.stops:
+        stops = _checks.as_times(
+            "stops", self.stops if _checks.as_floats("stops", self.stops).size else np.empty(0)
+        )
+        for stop in stops.tolist():
             _checks.whole("stops", stop, 1, len(points) - 2)
 
     def pose(self, t: FloatArray) -> Pose:

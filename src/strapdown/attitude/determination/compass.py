@@ -188,6 +188,7 @@ def master_slave(
     gx, gy, gz = np.moveaxis(np.where(np.isnan(f), 0.0, -f / gravity), -1, 0)
     pitch = -np.arcsin(np.clip(gx, -1.0, 1.0))  # (7.6.11)
     cosine = np.cos(pitch)
+    gy = np.clip(gy, -_checks.LARGEST, _checks.LARGEST)
     ratio = gy / np.where(cosine > 0.0, cosine, 1.0)
     roll = roll_by_quadrant(np.arcsin(np.clip(ratio, -1.0, 1.0)), gz, gy)  # (7.6.12)
     singular = (cosine < math.sin(min_angle)) | (np.abs(ratio) > math.cos(min_angle))

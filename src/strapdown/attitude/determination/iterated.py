@@ -95,9 +95,9 @@ def gradient_descent(
     >>> (np.abs(found.rpy) * 180 / np.pi).round(3)
     array([180.,   0.,   0.])
     """
-    _checks.positive("step", step)
+    step = _checks.in_range("step", step, 1e-9, 1e3)
     _checks.positive("tolerance", tolerance)
-    _checks.whole("max_iterations", max_iterations, 1)
+    max_iterations = _checks.whole("max_iterations", max_iterations, 1)
     data = epochs(v_b, v_n, sigma, min_angle)
     q = _start(q_nb, data)
     mu = np.full(len(q), step)
@@ -204,7 +204,7 @@ def gauss_newton(
     (array([ 0.,  0., 90.]), 3)
     """
     _checks.positive("tolerance", tolerance)
-    _checks.whole("max_iterations", max_iterations, 1)
+    max_iterations = _checks.whole("max_iterations", max_iterations, 1)
     data = epochs(v_b, v_n, sigma, min_angle)
     q = _start(q_nb, data)
     used = _components(components, data.b.shape[1])
@@ -241,7 +241,11 @@ def gauss_newton(
 
 def _start(q_nb: ArrayLike, data: Epochs) -> FloatArray:
     """Return the start of each epoch, shape (n, 4)."""
-    q = _checks.as_quats("q_nb", q_nb) if np.ndim(q_nb) != 1 else _near_unit(q_nb)
+    q = (
+        _checks.as_quats("q_nb", q_nb)
+        if _checks.as_floats("q_nb", q_nb).ndim != 1
+        else _near_unit(q_nb)
+    )
     n = len(data.b)
     if q.shape not in ((4,), (n, 4)):
         raise ValueError(f"`q_nb` must have shape (4,) or ({n}, 4), got {q.shape}.")
@@ -261,7 +265,7 @@ def _components(components: ArrayLike | None, m: int) -> FloatArray:
     """Return one where a component is used, zero elsewhere; shape (m, 3)."""
     if components is None:
         return np.ones((m, 3))
-    used = np.asarray(components)
+    used = _checks.as_floats("components", components)
     if used.shape != (m, 3):
         raise ValueError(f"`components` must have shape ({m}, 3), got {used.shape}.")
     used = used.astype(bool)

@@ -241,7 +241,7 @@ def _deviations(sigma: ArrayLike, shape: tuple[int, ...]) -> FloatArray:
         raise ValueError(
             f"`sigma` must be a number or have shape ({shape[1]},) or {shape}, got {array.shape}."
         ) from None
-    if not (np.isfinite(array) & (array > 0.0)).all():
+    if not ((array >= 1.0 / _checks.LARGEST) & (array <= _checks.LARGEST)).all():
         raise ValueError(f"`sigma` must be positive and finite, got {array.min():g}.")
     return np.asarray(array)
 

@@ -197,6 +197,22 @@ def test_rate_refuses_the_solution_of_another_recording():
         flt.rate(rec.between(0.0, 2.0), sol)
 
 
+@pytest.mark.parametrize("seed", [1, 4, 6])
+def test_without_a_gate_too_absurd_fields_leave_all_finite(seed):
+    """Fields of up to 1e8 T, of which the first is the reference: noise of nothing beside it."""
+    rng = np.random.default_rng(seed)
+    t = np.cumsum(10.0 ** rng.uniform(-6, 1, 3000))
+    wild = [10.0 ** rng.uniform(-8, 8, (3000, 1)) * rng.standard_normal((3000, 3)) for _ in "gam"]
+    for array in wild:
+        array[rng.random(3000) < 0.1] = np.nan
+        array[rng.random(3000) < 0.1] = 0.0
+    rec = Recording(imu=Imu(t=t, gyr=wild[0], acc=wild[1]), mag=Mag(t=t, mag=wild[2]))
+    for propagation in ("exact", "truncated"):
+        sol = IndirectEkf.terrestrial(propagation=propagation).run(rec, diagnostics=False)
+        for value in (sol.q_nb, sol.gyr_bias, sol.std_attitude_n, sol.std_gyr_bias):
+            assert np.isfinite(value).all()
+
+
 def test_parameters_out_of_range_are_refused():
     with pytest.raises(ValueError, match=r"`propagation` must be one of exact, truncated"):
         IndirectEkf(propagation="v1")

@@ -112,6 +112,18 @@ def test_innovation_beyond_the_gate_is_weighed_down_until_it_lies_on_it(sign):
     assert within[2]
 
 
+def test_measurement_surer_than_round_off_leaves_a_covariance():
+    """Variance 1e-25 beside a P of 10: the update's rounding is far larger than what is left."""
+    P, w = 10.0 * some_covariance(2), np.zeros(k.W_SIZE)
+    for h in np.random.default_rng(5).standard_normal((200, 3)):
+        left, expected, accepted = k.update_scalar(P, w, *h, 0.1, 1e-25, np.inf)
+        assert accepted
+        assert expected >= 0.0
+        assert np.isfinite(left)
+        assert np.all(np.diag(P) > 0.0)
+    assert np.isfinite(w).all()
+
+
 def test_direction_update_is_the_textbook_update_with_differenced_rows():
     """Three scalars in turn equal one update with H from differences over SciPy's rotations."""
     d_n, r = unit([0.3, -0.5, 0.8]), 0.04

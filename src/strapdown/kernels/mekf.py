@@ -61,6 +61,7 @@ P_STD_TILT = P_HEAD + 7  # [rad]
 P_STD_HEADING = P_HEAD + 8  # [rad]
 P_SIZE = P_HEAD + 9
 
+ROUND_OFF = 1e-12  # of P: no measurement is surer, lest its update leave P negative
 UNSEEN_TIME = 0.25  # correlation time of a rate beyond the range, or of one that sticks [s]
 
 # --- scratch -----------------------------------------------------------------------------
@@ -145,7 +146,8 @@ def update_scalar(
         w[W_PH + i] = P[i, 0] * h0 + P[i, 1] * h1 + P[i, 2] * h2
     hph = h0 * w[W_PH] + h1 * w[W_PH + 1] + h2 * w[W_PH + 2]
     left = innovation - h0 * w[W_DX] - h1 * w[W_DX + 1] - h2 * w[W_DX + 2]
-    expected = hph + r
+    hph = max(hph, 0.0)
+    expected = hph + max(r, ROUND_OFF * hph)
     variance = expected
     accepted = left * left <= gate * gate * expected
     if not accepted:

@@ -4,6 +4,7 @@ from math import atan2, inf, isnan, nan, sqrt
 
 from strapdown.kernels import status as s
 from strapdown.kernels._jit import Mat, Vec, kernel
+from strapdown.kernels.mekf import ROUND_OFF
 from strapdown.kernels.memory import (
     D_ACC,
     D_MAG,
@@ -32,7 +33,8 @@ def enter(P: Mat, w: Vec, hph: float, left: float, r: float, gate: float) -> tup
 
     Returns the innovation's variance, and whether it lies within the gate.
     """
-    expected = hph + r
+    hph = max(hph, 0.0)
+    expected = hph + max(r, ROUND_OFF * hph)
     variance = expected
     accepted = left * left <= gate * gate * expected
     if not accepted:

@@ -4,7 +4,6 @@ import os
 import statistics
 import subprocess
 import sys
-from functools import partial
 
 import imufusion
 import numpy as np
@@ -54,28 +53,6 @@ def test_run_of_every_estimator_stays_below_6_us(name, recording, take_turns, ta
     times = take_turns(5, here=lambda: flt.run(recording))
     table(f"{name} `run` with diagnostics, per sample", ns(times["here"], n), "", "6000 ns")
     assert times["here"] / n < 6e-6
-
-
-ALIKE = {
-    "two-stage": {},
-    "indirect-ekf": {"propagation": "truncated"},
-    "standard-ahrs": {},
-    "multi-mode-ahrs": {},
-}
-
-
-def test_filters_of_the_theses_are_within_twice_each_other(recording, take_turns, table):
-    flts = {name: sd.estimators.create(name, **p) for name, p in ALIKE.items()}
-    times = take_turns(**{name: partial(flt.run, recording) for name, flt in flts.items()})
-    each = sorted((took, name) for name, took in times.items())
-    ratio, n = each[-1][0] / each[0][0], len(recording.imu)
-    table(
-        "slowest of two-stage, truncated indirect-ekf and both AHRS over the quickest",
-        f"{ratio:.2f} times",
-        ", ".join(f"{name} {ns(took, n)}" for took, name in each),
-        "2 times",
-    )
-    assert ratio <= 2.0
 
 
 def test_kalman_filters_of_the_theses_cost_about_the_same(recording, take_turns, table):

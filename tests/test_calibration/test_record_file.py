@@ -215,6 +215,9 @@ def edited(tmp_path, *changes):
         (("[acc.fit]", "[acc.fit]\nresidual = [1.0]"),
          r"unknown key 'residual' in table \[acc\.fit\]; .* 'residuals'"),
         (("format_version = 1", "format_version = "), r"must be TOML, got"),
+        (("bias = [", "bias = [1.0, 2.0, 3.0]\nbias = ["), r'must be TOML, got Key "bias"'),
+        (('sensor_id = "', f'temp_degc = {"9" * 400}\nsensor_id = "'),
+         r"`acc\.temp_degc` must be a number of at most 64 bits, got 400 digits"),
     ],
 )  # fmt: skip
 def test_files_that_do_not_fit_are_refused_with_the_way_out(tmp_path, change, message):

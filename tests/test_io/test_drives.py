@@ -158,6 +158,17 @@ def test_the_mount_decides_the_attitude_of_the_box(tmp_path: Path) -> None:
     assert a.t[np.argmax(a.valid)] == 20.0
 
 
+def test_an_angle_that_is_no_number_costs_its_own_sample_alone(tmp_path: Path) -> None:
+    folder = make_drive(tmp_path / "d")
+    sound = sd.read(folder).reference.attitude
+    path = folder / "reference_attitude.csv.gz"
+    lines = gzip.decompress(path.read_bytes()).decode().split("\n")
+    lines[501] = "50,inf,1e-9,0"
+    path.write_bytes(gzip.compress("\n".join(lines).encode()))
+    attitude = sd.read(folder).reference.attitude
+    assert np.flatnonzero(sound.valid != attitude.valid).tolist() == [500]
+
+
 def test_a_file_of_the_manifest_that_is_missing_is_named(tmp_path: Path) -> None:
     folder = make_drive(tmp_path / "d")
     (folder / "gnss.csv.gz").unlink()

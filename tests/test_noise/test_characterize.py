@@ -286,6 +286,8 @@ def test_file_says_its_units_and_what_was_not_seen(found, tmp_path):
         (("date = ", "date = 5 #"), "`date` must be a date such as 2025-03-31, got 5"),
         (("rate_hz = 50.0", "rate_hz = -1.0"), "`fs` must be positive"),
         (("type = ", "type : "), "must be TOML"),
+        (("date = ", "date = 2020-01-01\ndate = "), 'must be TOML, got Key "date" already exists'),
+        (("start_s = 100.0", f"start_s = {'9' * 400}"), "`gyr.start_s` must be .* 64 bits"),
     ],
 )
 def test_file_with_faults_is_refused(found, tmp_path, change, message):

@@ -144,6 +144,10 @@ def test_files_that_are_no_scenarios_are_refused(tmp_path):
     broken.write_bytes(b"\xff\xfe\x00")
     with pytest.raises(FormatError, match="must be text in UTF-8"):
         load(broken)
+    with pytest.raises(InputError, match="`presets` must be a list of names, got 3"):
+        from_mapping({"motion": {"kind": "static"}, "sensors": {"presets": 3}})
+    with pytest.raises(InputError, match="must be a number of at most 64 bits"):
+        from_mapping({"motion": {"kind": "turntable", "rate_rpm": 10**400}})
     with pytest.raises(InputError, match="'motion' must be a table, got 3"):
         from_mapping({"motion": 3})
     with pytest.raises(InputError, match="both `gyr` and `acc` or neither"):

@@ -15,7 +15,6 @@ from typing import Any, Final
 
 import numpy as np
 import tomlkit
-from tomlkit.exceptions import ParseError
 
 from strapdown._checks import nearest
 from strapdown._types import FloatArray
@@ -30,6 +29,7 @@ from strapdown.calibration.record import (
 )
 from strapdown.errors import FormatError, InputError
 from strapdown.io._atomic import written_aside
+from strapdown.io._toml import read_toml
 from strapdown.units import UNITS, parse_unit
 
 FILE_TYPE: Final = "strapdown calibration"
@@ -71,10 +71,7 @@ def load(path: str | PathLike[str], *, convert_units: bool = False) -> Calibrati
         that it should not have. The message says what to write.
     """
     file = Path(path)
-    try:
-        document: dict[str, Any] = tomlkit.parse(file.read_text(encoding="utf-8")).unwrap()
-    except (ParseError, UnicodeDecodeError) as error:
-        raise FormatError(f"must be TOML, got {error}", file=file) from None
+    document = read_toml(file)
     _check_head(document, file)
     fits: list[Fit] = []
     for key, table in document.items():

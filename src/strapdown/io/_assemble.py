@@ -159,7 +159,7 @@ def _reference_fields(part: Part) -> dict[str, Any] | None:
     fields = fields_of(part)
     rpy = fields.pop("rpy", None)
     if "q_nb" not in fields and rpy is not None and rpy.shape == (len(part.t), 3):
-        fields["q_nb"] = quat_from_rpy(rpy)
+        fields["q_nb"] = quat_from_rpy(np.where(np.isfinite(rpy), rpy, np.nan))
     if "q_nb" not in fields or fields["q_nb"].shape != (len(part.t), 4):
         return None
     fields["q_nb"] = unit_quats(fields["q_nb"], part)

@@ -165,7 +165,7 @@ def _quats(part: Part) -> FloatArray | None:
         return unit_quats(q, part)
     rpy = fields.get("rpy")
     if rpy is not None and rpy.shape == (n, 3):
-        return rotation.quat_from_rpy(rpy)
+        return rotation.quat_from_rpy(np.where(np.isfinite(rpy), rpy, np.nan))
     return None
 
 

@@ -161,7 +161,13 @@ def _samples(
 
 def _rpy(table: Table, options: Options, raw: RawLog) -> tuple[FloatArray, FloatArray]:
     """Return times and roll, pitch, yaw [rad]."""
-    return _samples(table, ("roll_deg", "pitch_deg", "yaw_deg"), options, raw)
+    t, rpy = _samples(table, ("roll_deg", "pitch_deg", "yaw_deg"), options, raw)
+    return t, np.where(np.isfinite(rpy), rpy, np.nan)
+
+
+def _stated(rpy: FloatArray) -> BoolArray:
+    """Return where the angles are known: before it knows any, the reference writes zeros."""
+    return np.asarray(np.isfinite(rpy).all(axis=1) & (rpy != 0.0).any(axis=1))
 
 
 def _position(
@@ -230,7 +236,7 @@ def _mount(table: Table | None, options: Options, raw: RawLog) -> MountReference
         return None
     t, rpy = _rpy(table, options, raw)
     C_vb = np.diag([1.0, -1.0, -1.0]) @ dcm_from_rpy(rpy)
-    return MountReference(t=t, q_vb=quat_from_dcm(C_vb), valid=(rpy != 0.0).any(axis=1))
+    return MountReference(t=t, q_vb=quat_from_dcm(C_vb), valid=_stated(rpy))
 
 
 def _attitude(
@@ -253,7 +259,7 @@ def _attitude(
     # The mount is constant but for its estimate's progress: its ends are held.
     q_vb = interpolate(np.clip(t, t_known[0], t_known[-1]), t_known, q_known)
     q_nb = quat_mul(quat_from_rpy(rpy), q_vb)
-    valid = (rpy != 0.0).any(axis=1) & (t >= t_known[0])
+    valid = _stated(rpy) & (t >= t_known[0])
     return AttitudeReference(t=t, q_nb=q_nb, valid=valid)
 
 
@@ -295,7 +301,7 @@ def _tilt(attitude: AttitudeReference, imu: Imu) -> FloatArray:
     low = np.concatenate((edges[:1], edges[:-1]))
     count = np.maximum(edges - low, 1)[:, None]
     f_n = rotate(attitude.q_nb, (sums[edges] - sums[low]) / count)
-    total = np.concatenate((np.zeros((1, 3)), np.cumsum(f_n, axis=0)))
+    total = np.concatenate((np.zeros((1, 3)), np.cumsum(np.nan_to_num(f_n), axis=0)))
     first = np.searchsorted(attitude.t, attitude.t - 0.5 * _TILT_WINDOW_S, side="left")
     last = np.searchsorted(attitude.t, attitude.t + 0.5 * _TILT_WINDOW_S, side="right")
     mean = total[last] - total[first]

@@ -13,11 +13,11 @@ from typing import Any, Final
 
 import numpy as np
 import tomlkit
-from tomlkit.exceptions import ParseError
 
 from strapdown._checks import instance, nearest
 from strapdown.errors import FormatError
 from strapdown.io._atomic import written_aside
+from strapdown.io._toml import read_toml
 from strapdown.noise.coefficients import (
     SYMBOLS,
     Coefficient,
@@ -89,10 +89,7 @@ def load(path: str | PathLike[str]) -> NoiseRecord:
         it should not have.
     """
     file = Path(path)
-    try:
-        document: dict[str, Any] = tomlkit.parse(file.read_text(encoding="utf-8")).unwrap()
-    except (ParseError, UnicodeDecodeError) as error:
-        raise FormatError(f"must be TOML, got {error}", file=file) from None
+    document = read_toml(file)
     if document.get("type") != FILE_TYPE:
         raise FormatError(
             f"must begin with `type = {FILE_TYPE!r}`, got {document.get('type')!r}",

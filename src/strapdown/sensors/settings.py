@@ -151,4 +151,6 @@ def _converted(value: Any, entry: Entry, place: str) -> Any:
         return value
     if isinstance(value, (bool, str)) or not isinstance(value, (int, float)):
         raise InputError(f"{place}: must be a number, got {value!r}.")
+    if isinstance(value, int) and abs(value) >= 2**63:
+        raise InputError(f"{place}: must be a number of at most 64 bits, got one of more digits.")
     return value * entry.factor + entry.offset

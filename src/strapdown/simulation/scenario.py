@@ -325,6 +325,8 @@ def _device(table: dict[str, Any], place: str) -> Device:
     presets = table.pop("presets", [])
     if isinstance(presets, str):
         presets = [presets]
+    if not isinstance(presets, list | tuple):
+        raise InputError(f"{place}: `presets` must be a list of names, got {presets!r}.")
     device = Device(name=" + ".join(map(str, presets)) or "custom")
     for name in presets:
         part = preset(_name(name, preset_names(), f"{place}, presets"))

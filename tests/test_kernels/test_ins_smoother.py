@@ -24,14 +24,17 @@ def test_adjoint_pass_agrees_with_dense_smoothing_of_random_steps():
     history = []
     for _ in range(steps):
         F = 0.3 * rng.standard_normal((9, M)) * (rng.random((9, M)) < 0.4)
-        e = 0.8
+        fade = 0.8, 0.5, 0.3, 0.2  # of b_p and b_r, of b_v, of b_r and b_v into b_p
         Phi = np.eye(N)
         Phi[:9, :M] += F
-        Phi[i_bp : i_bp + 3] *= e
+        Phi[i_bp : i_bp + 6] *= fade[0]
+        Phi[i_bp + 6 : i_bp + 9] *= fade[1]
+        Phi[range(i_bp, i_bp + 3), range(i_bp + 3, i_bp + 6)] = fade[2]
+        Phi[range(i_bp, i_bp + 3), range(i_bp + 6, i_bp + 9)] = fade[3]
         at = int(w[k.NEXT])
-        size = 3 + 9 * M
-        w[at], w[at + 1], w[at + size - 1] = k.R_PREDICT, e, size
-        w[at + 2 : at + 2 + 9 * M] = F.ravel()
+        size = 6 + 9 * M
+        w[at], w[at + 1 : at + 5], w[at + size - 1] = k.R_PREDICT, fade, size
+        w[at + 5 : at + 5 + 9 * M] = F.ravel()
         w[k.NEXT] = at + size
         Q = np.diag(rng.uniform(0.01, 0.1, N))
         x_before, P_before = Phi @ x, Phi @ P @ Phi.T + Q

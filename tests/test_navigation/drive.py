@@ -78,6 +78,8 @@ def simulate(
     acc_noise=5e-3,
     gyr_bias=(0.002, -0.006, 0.004),
     acc_bias=(0.05, -0.08, 0.1),
+    gyr_scale=0.002,
+    acc_scale=0.001,
     slip=0.05,
     bounce=0.1,
     arm=1.5,
@@ -141,10 +143,16 @@ def simulate(
     w_v = np.einsum("kji,kj->ki", C_nv, w_ie + w_en)
     w_v[:, 2] += r
     at = slice(fine, None, fine)
-    gyr = _mean(w_v, n, fine) @ C_vb + noise * (
+    # errors of scale and axes; the force's act on what differs from standing still, whose own is
+    # a bias
+    odd = np.random.default_rng((seed, 1)).standard_normal((2, 3, 3))
+    turn_b, force_b = _mean(w_v, n, fine) @ C_vb, _mean(f_v, n, fine) @ C_vb
+    turn_b = turn_b + noise * gyr_scale * turn_b @ odd[0]
+    force_b = force_b + noise * acc_scale * (force_b + [0.0, 0.0, 9.8] @ C_vb) @ odd[1]
+    gyr = turn_b + noise * (
         np.asarray(gyr_bias) + gyr_noise * np.sqrt(rate) * rng.standard_normal((n, 3))
     )
-    acc = _mean(f_v, n, fine) @ C_vb + noise * (
+    acc = force_b + noise * (
         np.asarray(acc_bias) + acc_noise * np.sqrt(rate) * rng.standard_normal((n, 3))
     )
     t = tf[at]

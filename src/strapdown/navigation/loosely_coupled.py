@@ -15,13 +15,17 @@ from strapdown.recording import Recording
 from strapdown.solution import COLUMNS, Diagnostics, Solution
 from strapdown.units import DEG
 
-STATES: Final = ("scale", "mount", "antenna", "delay", "fix_error", "odometer", "barometer")
+STATES: Final = (
+    "gyro_scale", "acc_scale", "mount", "antenna", "delay", "fix_error", "odometer", "barometer",
+)  # fmt: skip
 # Where the index of an optional block stands in `p`, and its number of states.
 _BLOCKS: Final = {
+    "gyro_scale": (("I_SG", 3),),
+    "acc_scale": (("I_SA", 3),),
     "mount": (("I_MOUNT", 3), ("I_ARM_V", 1)),
     "antenna": (("I_ARM_A", 3),),
     "delay": (("I_DELAY", 1),),
-    "fix_error": (("I_BP", 3),),
+    "fix_error": (("I_BP", 9),),
     "odometer": (("I_SODO", 1),),
     "barometer": (("I_BARO", 1),),
 }
@@ -37,7 +41,7 @@ _AXES: Final = ("north", "east", "down")
 
 @register(
     source="error-state INS/GNSS filter (Groves 2013, ch. 14); smoother of Bierman 1973",
-    cost="15 to 34 states at 10 Hz, mechanisation at the IMU's rate",
+    cost="15 to 40 states at 10 Hz, mechanisation at the IMU's rate",
     needs=("gnss",),
     uses=("speed", "baro"),
     gives="navigation",
@@ -49,7 +53,7 @@ class LooselyCoupled(Estimator):
 
     State: attitude, velocity, position, gyro and accelerometer bias (15 error states), and by
     `states` the mount of the box in the vehicle with the arm to its point without side slip, the
-    arm to the antenna, the delay between the clocks of receiver and IMU, the slow error of the
+    arm to the antenna, the delay between the clocks of receiver and IMU, the slow errors of the
     fixes, scale errors, a wheel speed's scale and a barometer's offset. Strapdown mechanisation
     in NED on WGS-84; error state ``phi_n, dv_n, dp_n, db_g, db_a`` with
     ``q_true = exp(phi_n) q_nb``.
@@ -66,9 +70,9 @@ class LooselyCoupled(Estimator):
     Parameters
     ----------
     states : tuple of str
-        Optional blocks that are estimated, of ``scale``, ``mount``, ``antenna``, ``delay``,
-        ``fix_error``, ``odometer``, ``barometer``. Without ``mount`` the mount is found once and
-        then kept.
+        Optional blocks that are estimated, of ``gyro_scale``, ``acc_scale``, ``mount``,
+        ``antenna``, ``delay``, ``fix_error``, ``odometer``, ``barometer``. Without ``mount`` the
+        mount is found once and then kept.
     vehicle : {'car', 'none'}
         ``'none'``: any carrier; no mount, no constraint, no standstill.
     standstill : bool
@@ -78,10 +82,14 @@ class LooselyCoupled(Estimator):
     gyr_bias_walk, acc_bias_walk : float
         Random walk of the biases [(rad/s)/sqrt(s)], [(m/s^2)/sqrt(s)]. Larger follows warming
         sensors faster and coasts worse.
+    gyr_scale_noise, acc_scale_noise : float
+        Noise in proportion to the angular rate and to the acceleration [sqrt(s)]: what errors of
+        scale and axes do in a turn.
     std_gyr_bias, std_acc_bias : float
         Sigma of the biases before anything is known [rad/s], [m/s^2].
     std_gyr_scale, std_acc_scale : float
-        Sigma of the scale errors.
+        Sigma of the errors of scale and axes that are estimated: of the gyroscope what each of its
+        axes reads of a turn about the vertical, of the accelerometer each axis of itself.
     std_mount : float
         Sigma of the mount once it is found [rad].
     mount_walk : float
@@ -94,11 +102,15 @@ class LooselyCoupled(Estimator):
     std_delay : float
         Sigma of the delay between the clocks [s].
     fix_share : float
-        Slow error of the fixes' position, in sigmas of the receiver.
+        Slow error of the fixes' position in sigmas of the receiver, to begin with.
     fix_time : float
-        Its time constant [s].
+        Both time constants of that error, which drifts smoothly [s].
     velocity_share : float
         Error of the fixes' velocity in sigmas of the receiver, to begin with.
+    velocity_time : float
+        How long it lasts [s]. What lasts is in the drift of the position too.
+    velocity_lag : float
+        Error of the fixes' velocity per horizontal acceleration [s]: a receiver smooths.
     learning : float
         Rate at which the scales of the fixes' errors follow, per fix. Zero keeps them, which with
         ``fix_share=1, velocity_share=1`` takes the receiver by its word.
@@ -134,7 +146,7 @@ class LooselyCoupled(Estimator):
     back by the delay, which at 30 m/s and 50 ms is 1.5 m. Left out of the error model: Coriolis
     and Schuler terms, side slip on ice. Not for positions within 64 m of a pole.
 
-    Memory: 280 numbers and the covariance; with smoothing 8 kB for each 80 s and a tape of 8 MB
+    Memory: 330 numbers and the covariance; with smoothing 8 kB for each 80 s and a tape of 8 MB
     besides the solution itself.
 
     References
@@ -174,6 +186,7 @@ class LooselyCoupled(Estimator):
         Taken("std_acc_bias", "acc_bias_std"),
     )
     states: tuple[str, ...] = (
+        "gyro_scale",
         "mount",
         "antenna",
         "delay",
@@ -187,6 +200,8 @@ class LooselyCoupled(Estimator):
     acc_noise: float = 5e-3
     gyr_bias_walk: float = 5e-6
     acc_bias_walk: float = 1e-4
+    gyr_scale_noise: float = 3e-3
+    acc_scale_noise: float = 3e-3
     std_gyr_bias: float = 0.01
     std_acc_bias: float = 0.15
     std_gyr_scale: float = 0.005
@@ -198,8 +213,10 @@ class LooselyCoupled(Estimator):
     std_antenna: float = 0.7
     std_delay: float = 0.05
     fix_share: float = 1.0
-    fix_time: float = 20.0
+    fix_time: float = 3.0
     velocity_share: float = 0.2
+    velocity_time: float = 1.0
+    velocity_lag: float = 0.02
     learning: float = 0.02
     gate: float = 5.5
     recover: float = 15.0
@@ -250,9 +267,7 @@ class LooselyCoupled(Estimator):
         p[_m.P_GYR_RANGE] = self.gyr_range
         p[_m.P_ACC_RANGE] = self.acc_range
         n = k.CORE
-        if "scale" in self.states:
-            n += 6
-        p[k.M] = n
+        p[k.M] = n + 3 * len({"gyro_scale", "acc_scale"} & set(self.states))
         for name, blocks in _BLOCKS.items():
             for cell, count in blocks:
                 on = name in self.states and not (name == "mount" and self.vehicle == "none")
@@ -265,12 +280,14 @@ class LooselyCoupled(Estimator):
             "Q_BG": self.gyr_bias_walk, "Q_BA": self.acc_bias_walk,
             "Q_MOUNT": self.mount_walk,
             "SD_BG": self.std_gyr_bias, "SD_BA": self.std_acc_bias,
+            "Q_SG": self.gyr_scale_noise, "Q_SA": self.acc_scale_noise,
             "SD_SCALE_G": self.std_gyr_scale, "SD_SCALE_A": self.std_acc_scale,
             "SD_MOUNT": self.std_mount,
             "SD_ARM_V": self.std_arm_v, "ARM_V_0": self.arm_v,
             "SD_ARM_A": self.std_antenna, "SD_DELAY": self.std_delay,
             "TAU_BP": self.fix_time, "SHARE_BP": self.fix_share,
             "WHITE_P": self.fix_share if white else 0.05 * self.fix_share,
+            "TAU_BV": self.velocity_time, "LAG": self.velocity_lag,
             "SCALE_V": self.velocity_share, "LEARN": self.learning,
             "GATE": self.gate**2, "RECOVER": self.recover,
             "CAR": float(self.vehicle == "car"),
@@ -472,14 +489,15 @@ class LooselyCoupled(Estimator):
             "antenna_b_m": x[k.ARM_A : k.ARM_A + 3].tolist(),
             "side_slip_free_point_m": float(x[k.ARM_V]),
             "delay_s": float(x[k.DELAY]),
-            "fix_slow_scale": float(x[k.K_POS]),
-            "fix_fast_scale": float(x[k.K_WHITE]),
-            "velocity_scale": float(x[k.K_VEL]),
+            "fix_slow_scale": x[k.K_SLOW : k.K_SLOW + 2].tolist(),
+            "fix_fast_scale": x[k.K_WHITE : k.K_WHITE + 2].tolist(),
+            "velocity_slow_scale": x[k.K_SLOW + 2 : k.K_SLOW + 4].tolist(),
+            "velocity_fast_scale": x[k.K_WHITE + 2 : k.K_WHITE + 4].tolist(),
         }
         meta: dict[str, Any] = {"parameters": self.parameters(), "learned": learned}
         if len(status) and np.all(status & _s.ALIGNING):
             meta["advice"] = _advice(float(x[k.A_COUNT]), float(x[k.A_VAR]))
-        elif learned["velocity_scale"] > _MISFIT:
+        elif max(learned["velocity_slow_scale"] + learned["velocity_fast_scale"]) > _MISFIT:
             meta["advice"] = f"{_DO_NOT_FIT}: trust nothing; {_CHECK}"
         return Solution(
             t=t, status=status, filter=self.NAME, causal=causal, heading_reference="true",
@@ -490,10 +508,14 @@ class LooselyCoupled(Estimator):
 _POSITIVE: Final = (
     "gyr_noise", "acc_noise", "std_gyr_bias", "std_acc_bias", "std_gyr_scale", "std_acc_scale",
     "std_mount", "std_arm_v", "std_antenna", "std_delay", "fix_share", "fix_time",
-    "velocity_share", "gate", "recover", "std_side", "std_up", "constraint_time", "rest_gyr",
-    "rest_acc", "tick", "max_gap", "realign_gap", "std_start", "std_speed", "std_height",
+    "velocity_share", "velocity_time", "gate", "recover", "std_side", "std_up",
+    "constraint_time", "rest_gyr", "rest_acc", "tick", "max_gap", "realign_gap", "std_start",
+    "std_speed", "std_height",
 )  # fmt: skip
-_NOT_NEGATIVE: Final = ("gyr_bias_walk", "acc_bias_walk", "mount_walk", "learning", "slip")
+_NOT_NEGATIVE: Final = (
+    "gyr_bias_walk", "acc_bias_walk", "gyr_scale_noise", "acc_scale_noise", "mount_walk",
+    "velocity_lag", "learning", "slip",
+)  # fmt: skip
 
 
 def _layout() -> Any:

@@ -3,7 +3,7 @@
 With ``phi_n`` the attitude error in n (``C_true = (I + [phi x]) C_nb``) and ``f_n`` the specific
 force, the inertial rows of the error model are ::
 
-    phi' = -omega_in x phi - C_nb (db_g + diag(omega) ds_g)
+    phi' = -omega_in x phi - C_nb (db_g + omega_d ds_g)
     dv'  =  phi x f_n      - C_nb (db_a + diag(f) ds_a)
     dp'  =  dv
 
@@ -23,13 +23,15 @@ from math import sqrt
 
 from strapdown.kernels._jit import Mat, Vec, kernel
 from strapdown.kernels.ins.layout import (
+    ACC_N,
     ARM_A,
     ARM_V,
     BA,
     BARO,
     BG,
     BP,
-    CORE,
+    BR,
+    BV,
     DBA,
     DBG,
     DELAY,
@@ -38,6 +40,7 @@ from strapdown.kernels.ins.layout import (
     DV,
     DX,
     FIX_SD,
+    FIX_SV,
     GAIN,
     I_ARM_A,
     I_ARM_V,
@@ -45,24 +48,31 @@ from strapdown.kernels.ins.layout import (
     I_BP,
     I_DELAY,
     I_MOUNT,
+    I_SA,
+    I_SG,
     I_SODO,
-    K_POS,
+    K_SLOW,
     LLA,
     MOVED,
     N_SUMS,
     NEXT,
+    NOISE_A,
+    NOISE_G,
     PH,
     Q_A,
     Q_BA,
     Q_BG,
     Q_G,
     Q_MOUNT,
+    Q_SA,
+    Q_SG,
     QVB,
     R_E,
     R_N,
     R_PREDICT,
     R_RESET,
     R_SCALAR,
+    RATE,
     RECORD,
     S_C,
     S_CF,
@@ -73,6 +83,7 @@ from strapdown.kernels.ins.layout import (
     SODO,
     STRIDE,
     TAU_BP,
+    TAU_BV,
     W_IN,
     F,
     G,
@@ -91,6 +102,8 @@ BARO_WALK = 0.05  # of the barometer's offset, weather and wind [m/sqrt(s)]
 def transition(x: Vec, p: Vec, w: Vec) -> None:
     """Write ``Phi - I`` of the nine inertial rows into ``w[F]``, 9 x m."""
     m = int(p[M])
+    sg = int(p[I_SG])
+    sa = int(p[I_SA])
     dt = x[DT]
     for i in range(9 * m):
         w[F + i] = 0.0
@@ -119,9 +132,10 @@ def transition(x: Vec, p: Vec, w: Vec) -> None:
             w[v + i * m + DBA + j] = -c
             w[F + (DP + i) * m + j] = 0.5 * dt * w[v + i * m + j]
             w[F + (DP + i) * m + DBA + j] = -0.5 * dt * c
-            if m > CORE:
-                w[F + i * m + CORE + j] = -x[S_CW + 3 * i + j]
-                w[v + i * m + CORE + 3 + j] = -x[S_CF + 3 * i + j]
+            if sg > 0:
+                w[F + i * m + sg + j] = -x[S_CW + 3 * i + j]
+            if sa > 0:
+                w[v + i * m + sa + j] = -x[S_CF + 3 * i + j]
     # half of the attitude error that a gyro bias makes in the tick acts on the velocity
     for j in range(3):
         a, b, c = -0.5 * x[S_C + j], -0.5 * x[S_C + 3 + j], -0.5 * x[S_C + 6 + j]
@@ -160,25 +174,35 @@ def predict(x: Vec, P: Mat, p: Vec, w: Vec) -> None:
             a = P[i, j] + w[G + i * STRIDE + j]
             P[i, j] = a
             P[j, i] = a
-    _noise(P, p, dt)
-    e = _fade_fix_error(x, P, p, dt)
+    _noise(x, P, p, dt)
+    ep, ev, cr, cv = _fade_fix_error(x, P, p, dt)
     if w[RECORD] > 0.0:
         at = int(w[NEXT])
         w[at] = float(R_PREDICT)
-        w[at + 1] = e
+        w[at + 1] = ep
+        w[at + 2] = ev
+        w[at + 3] = cr
+        w[at + 4] = cv
         for i in range(9 * m):
-            w[at + 2 + i] = w[F + i]
-        w[at + 2 + 9 * m] = 3.0 + 9.0 * m
-        w[NEXT] = at + 3.0 + 9.0 * m
+            w[at + 5 + i] = w[F + i]
+        w[at + 5 + 9 * m] = 6.0 + 9.0 * m
+        w[NEXT] = at + 6.0 + 9.0 * m
     for i in range(N_SUMS):
         x[DT + i] = 0.0
 
 
 @kernel
-def _noise(P: Mat, p: Vec, dt: float) -> None:
-    """Add the process noise of `dt` seconds."""
-    qg = p[Q_G] * p[Q_G] * dt
-    qa = p[Q_A] * p[Q_A] * dt
+def _noise(x: Vec, P: Mat, p: Vec, dt: float) -> None:
+    """Add the process noise of `dt` seconds.
+
+    It is the carrier's vibration, or the sensor's own noise where that is more, as it shows in the
+    quietest second so far; and what errors of scale and axes leave, in proportion to rate and
+    acceleration.
+    """
+    rate2 = x[RATE] * x[RATE] + x[RATE + 1] * x[RATE + 1] + x[RATE + 2] * x[RATE + 2]
+    acc2 = x[ACC_N] * x[ACC_N] + x[ACC_N + 1] * x[ACC_N + 1] + x[ACC_N + 2] * x[ACC_N + 2]
+    qg = (max(p[Q_G] * p[Q_G], x[NOISE_G]) + p[Q_SG] * p[Q_SG] * rate2) * dt
+    qa = (max(p[Q_A] * p[Q_A], x[NOISE_A]) + p[Q_SA] * p[Q_SA] * acc2) * dt
     for i in range(3):
         P[i, i] += qg
         P[DV + i, DV + i] += qa
@@ -197,22 +221,67 @@ def _noise(P: Mat, p: Vec, dt: float) -> None:
 
 
 @kernel
-def _fade_fix_error(x: Vec, P: Mat, p: Vec, dt: float) -> float:
-    """Let the slow error of the fixes' position fade (Gauss-Markov); return its factor."""
+def _drive(P: Mat, a: int, b: int, sd: float, tau: float, e: float, dt: float) -> None:
+    """Add what drives the rate `b`, of sigma `sd`, during a tick, and its integral in `a`."""
+    q = 2.0 * sd * sd * dt / tau  # leading terms: a tick is short against tau
+    P[a, a] += q * dt * dt / 3.0
+    P[a, b] += 0.5 * q * dt
+    P[b, a] += 0.5 * q * dt
+    P[b, b] += sd * sd * (1.0 - e * e)
+
+
+@kernel
+def _fade_fix_error(x: Vec, P: Mat, p: Vec, dt: float) -> tuple[float, float, float, float]:
+    """Move the slow errors of the fixes by a tick.
+
+    b_r and b_v are driven by white noise ::
+
+        b_p' = b_r + b_v - b_p / tau_p,    b_r' = -b_r / tau_p,    b_v' = -b_v / tau_v
+
+    Returns the factors of b_p and b_r, of b_v, and those of b_r and b_v into b_p.
+    """
     k = int(p[I_BP])
     if k < 0:
-        return 1.0
+        return 1.0, 1.0, 0.0, 0.0
     n = int(p[N])
-    e = exponential(-dt / p[TAU_BP])
+    ep = exponential(-dt / p[TAU_BP])
+    ev = exponential(-dt / p[TAU_BV])
+    cr = dt * ep
+    cv = 0.5 * dt * (ev + ep)
+    apart = 1.0 / p[TAU_BV] - 1.0 / p[TAU_BP]
+    if abs(apart) * dt > 1e-4:  # the other leaves out a twelfth of its square
+        cv = (ep - ev) / apart
     for i in range(k, k + 3):
         for j in range(n):
-            P[i, j] *= e
+            P[i, j] = ep * P[i, j] + cr * P[i + 3, j] + cv * P[i + 6, j]
+            P[i + 3, j] *= ep
+            P[i + 6, j] *= ev
+    for i in range(k, k + 3):
+        for j in range(k, k + 9):
+            P[j, i] = ep * P[j, i] + cr * P[j, i + 3] + cv * P[j, i + 6]
+            P[j, i + 3] *= ep
+            P[j, i + 6] *= ev
+    for i in range(k, k + 9):
         for j in range(n):
-            P[j, i] *= e
-        sd = x[K_POS] * x[FIX_SD + i - k]
-        P[i, i] += sd * sd * (1.0 - e * e)
-        x[BP + i - k] *= e
-    return e
+            if j < i or j >= k + 9:
+                P[j, i] = P[i, j]
+    drift = drift_share(p)
+    for i in range(3):
+        sd = x[K_SLOW + i // 2] * x[FIX_SD + i]
+        _drive(P, k + i, k + 3 + i, drift * sd, p[TAU_BP], ep, dt)
+        sd = x[K_SLOW + 2 + i // 2] * x[FIX_SV + i]
+        _drive(P, k + i, k + 6 + i, sd, p[TAU_BV], ev, dt)
+        x[BP + i] = ep * x[BP + i] + cr * x[BR + i] + cv * x[BV + i]
+        x[BR + i] *= ep
+        x[BV + i] *= ev
+    return ep, ev, cr, cv
+
+
+@kernel
+def drift_share(p: Vec) -> float:
+    """Sigma of the drift b_r that by itself makes one of b_p [1/s]."""
+    share: float = sqrt(2.0) / p[TAU_BP]
+    return share
 
 
 @kernel
@@ -324,17 +393,19 @@ def apply(x: Vec, p: Vec, w: Vec, d: int) -> None:
     x[LLA] += w[d + DP] / x[R_N]
     x[LLA + 1] += w[d + DP + 1] / x[R_E]
     x[LLA + 2] -= w[d + DP + 2]
-    if p[M] > CORE:
-        for i in range(3):
-            x[SG + i] += w[d + CORE + i]
-            x[SA + i] += w[d + CORE + 3 + i]
+    _add(x, SG, w, d, int(p[I_SG]), 3)
+    _add(x, SA, w, d, int(p[I_SA]), 3)
     k = int(p[I_MOUNT])
     if k > 0:
         _turn(x, QVB, w[d + k], w[d + k + 1], w[d + k + 2])
     _add(x, ARM_V, w, d, int(p[I_ARM_V]), 1)
     _add(x, ARM_A, w, d, int(p[I_ARM_A]), 3)
     _add(x, DELAY, w, d, int(p[I_DELAY]), 1)
-    _add(x, BP, w, d, int(p[I_BP]), 3)
+    k = int(p[I_BP])
+    _add(x, BP, w, d, k, 3)
+    if k > 0:
+        _add(x, BR, w, d, k + 3, 3)
+        _add(x, BV, w, d, k + 6, 3)
     _add(x, SODO, w, d, int(p[I_SODO]), 1)
     _add(x, BARO, w, d, int(p[I_BARO]), 1)
 

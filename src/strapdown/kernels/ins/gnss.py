@@ -1,10 +1,11 @@
 """GNSS fixes: measurement rows at the antenna and at the time of the fix, gating, recovery.
 
-What a receiver gives is filtered: its position errs slowly, and its velocity is far better than
-it says. Both are learned, causally: position has an error state `b_p` (Gauss-Markov) whose drive
-is scaled by ``x[K_POS]``, white noise scaled by ``x[K_WHITE]``, velocity by ``x[K_VEL]``. The
-scales move until the normalised innovations are one on average; of a position, the correlation
-of one innovation with the next tells which of the two errors to blame.
+What a receiver gives is filtered: its velocity errs for a second or so, its position is in part
+the integral of that and errs slowly, and both are often far better than it says. Velocity has an
+error state `b_v` (Gauss-Markov), position a state `b_p` that integrates it and has a drive of its
+own. The scales of both drives, ``x[K_SLOW]``, and of white noise beside them, ``x[K_WHITE]``, are
+learned, causally, level and down apart: they move until the normalised innovations are one on
+average; the correlation of one innovation with the next tells which of the two to blame.
 """
 
 from math import exp, isnan, nan, pi, sqrt
@@ -22,6 +23,8 @@ from strapdown.kernels.ins.layout import (
     ACC_N,
     ARM_A,
     BP,
+    BR,
+    BV,
     D_LAST,
     D_NEW,
     D_NPOS,
@@ -36,7 +39,9 @@ from strapdown.kernels.ins.layout import (
     DV,
     FIX_SD,
     FIX_SPEED,
+    FIX_SV,
     FIX_T,
+    FIXES,
     GATE,
     I_ARM_A,
     I_BP,
@@ -48,9 +53,9 @@ from strapdown.kernels.ins.layout import (
     IN_V,
     JUMP,
     JUMPS,
-    K_POS,
-    K_VEL,
+    K_SLOW,
     K_WHITE,
+    LAG,
     LEARN,
     LLA,
     MODE,
@@ -63,9 +68,12 @@ from strapdown.kernels.ins.layout import (
     RHO,
     ROWS,
     S3,
+    SCALE_V,
+    SHARE_BP,
     STRIDE,
     T_POS,
     T_VEL,
+    WHITE_P,
     H,
     N,
     Q,
@@ -88,11 +96,16 @@ DEFAULT_SP = 5.0  # where the receiver states none
 DEFAULT_SV = 0.5
 LARGEST_SP = 1e4  # a fix with more is none
 LARGEST_SV = 100.0
-FLOOR_P = 0.02  # white error of any fix [m], [m/s]
-FLOOR_V = 0.01
-LEAST_K = 0.05
+FLOOR_P = 0.004  # white error of any fix: 1e-7 deg of resolution [m], [m/s]
+FLOOR_V = 0.004
+LEAST_K = 0.005
 MOST_K = 3.0
 MOST_NIS = 4.0  # per axis, for learning: one outlier teaches little
+CLIPPED_ONE = 0.9205  # mean of chi-square of one, clipped there
+CLIPPED_TWO = 0.9817  # and of half of chi-square of two
+EARLY = 10.0  # how much faster the first fixes teach
+SOON = 10.0  # how many these are
+SURE_RHO = 0.1  # a correlation below this may be chance
 AGREE = 3  # rejected fixes in a row that agree, before a jump is believed
 
 
@@ -169,7 +182,10 @@ def position_row(x: Vec, p: Vec, w: Vec, i: int, age: float) -> float:
     k = int(p[I_BP])
     if k > 0:
         w[H + k + i] = 1.0
-    expected: float = arm - x[V + i] * age + 0.5 * age * age * x[ACC_N + i] + x[BP + i]
+        w[H + k + 3 + i] = -age
+        w[H + k + 6 + i] = -age
+    v = x[V + i] + x[BR + i] + x[BV + i]
+    expected: float = arm - v * age + 0.5 * age * age * x[ACC_N + i] + x[BP + i]
     return expected
 
 
@@ -190,7 +206,10 @@ def velocity_row(x: Vec, p: Vec, w: Vec, i: int, age: float) -> float:
     k = int(p[I_DELAY])
     if k > 0:
         w[H + k] = -x[ACC_N + i]
-    expected: float = arm - x[ACC_N + i] * age
+    k = int(p[I_BP])
+    if k > 0:
+        w[H + k + 6 + i] = 1.0
+    expected: float = arm - x[ACC_N + i] * age + x[BV + i]
     return expected
 
 
@@ -231,12 +250,13 @@ def _use_row(p: Vec, w: Vec, i: int) -> None:
 @kernel
 def _variance(x: Vec, p: Vec, kind: int, i: int) -> float:
     """White variance of axis i."""
-    sd: float = x[K_VEL] * x[IN_SV + i]
-    least = FLOOR_V
+    k = x[K_WHITE + 2 * kind + i // 2]
     if kind == 0:
-        sd = x[K_WHITE] * x[IN_SP + i]
-        least = FLOOR_P
-    return sd * sd + least * least
+        sd: float = k * x[IN_SP + i]
+        return sd * sd + FLOOR_P * FLOOR_P
+    sd = k * x[IN_SV + i]
+    lag: float = p[LAG] * p[LAG] * (x[ACC_N] * x[ACC_N] + x[ACC_N + 1] * x[ACC_N + 1])
+    return sd * sd + FLOOR_V * FLOOR_V + lag
 
 
 @kernel
@@ -279,29 +299,57 @@ def _take(x: Vec, P: Mat, p: Vec, w: Vec, kind: int) -> None:
 
 
 @kernel
-def _learn(p: Vec, k: float, nis: float, part: float) -> float:
-    """Scale that drifts up while the normalised innovations exceed one, and down below."""
-    grown: float = k * exp(part * p[LEARN] * (min(nis / 3.0, MOST_NIS) - 1.0))
+def begin_learning(x: Vec, p: Vec) -> None:
+    """Set what is believed of the receiver before its first innovation."""
+    slow = p[I_BP] > 0.0
+    for i in range(2):
+        x[K_SLOW + i] = p[SHARE_BP]
+        x[K_SLOW + 2 + i] = p[SCALE_V]
+        x[K_WHITE + i] = p[WHITE_P]
+        x[K_WHITE + 2 + i] = 0.5 * p[SCALE_V] if slow else p[SCALE_V]
+    for i in range(4):
+        x[RHO + i] = 0.25
+    for i in range(6):
+        x[D_LAST + i] = 0.0
+    x[FIXES] = 0.0
+
+
+@kernel
+def _scaled(k: float, rate: float, nis: float, mean: float) -> float:
+    """Scale that drifts up while clipped innovations squared exceed their mean, and down below."""
+    grown: float = k * exp(rate * (min(nis, MOST_NIS) - mean))
     return min(max(grown, LEAST_K), MOST_K)
 
 
 @kernel
-def _learn_position(x: Vec, p: Vec, w: Vec, nis: float) -> None:
-    """Divide the blame of a position's innovation between slow and fast error."""
-    c = 0.0
-    for i in range(3):
-        z = w[D_POS + i] / w[D_SPOS + i]
-        c += min(max(z, -3.0), 3.0) * x[D_LAST + i] / 3.0
-        x[D_LAST + i] = min(max(z, -3.0), 3.0)
-    x[RHO] += p[LEARN] * (c - x[RHO] * max(nis / 3.0, 0.1))
-    slow = 0.0
-    k = int(p[I_BP])
-    if k > 0:
-        slow = min(max(2.0 * x[RHO], 0.0), 1.0)
-        # a drive that is too strong shows in innovations that change sign
-        x[K_POS] = max(x[K_POS] * exp(4.0 * p[LEARN] * min(x[RHO], 0.0)), LEAST_K)
-    x[K_POS] = _learn(p, x[K_POS], nis, slow)
-    x[K_WHITE] = _learn(p, x[K_WHITE], nis, 1.0 - slow)
+def _learn(x: Vec, p: Vec, w: Vec, kind: int) -> None:
+    """Divide the blame of an innovation between slow and white error, level and down apart."""
+    rate = p[LEARN] * (1.0 + EARLY / (1.0 + x[FIXES] / SOON))
+    for down in range(2):
+        k = 2 * kind + down
+        first = 2 * down
+        axes = 2 - down
+        mean = CLIPPED_ONE if down == 1 else CLIPPED_TWO
+        nis = 0.0
+        c = 0.0
+        for i in range(first, first + axes):
+            z = w[D_POS + 3 * kind + i] / w[D_SPOS + 3 * kind + i]
+            nis += z * z / float(axes)
+            z = min(max(z, -3.0), 3.0)
+            c += z * x[D_LAST + 3 * kind + i] / float(axes)
+            x[D_LAST + 3 * kind + i] = z
+        x[RHO + k] += p[LEARN] * (c - x[RHO + k] * max(min(nis, 9.0), 0.1))
+        slow = 0.0
+        if p[I_BP] > 0.0:
+            slow = min(max(2.0 * x[RHO + k], 0.0), 1.0)
+            # a drive that is too strong shows in innovations that change sign, one that is too
+            # weak in innovations that repeat
+            rho = x[RHO + k]
+            turn = 4.0 * p[LEARN] * (rho - min(max(rho, -SURE_RHO), SURE_RHO))
+            x[K_SLOW + k] = max(x[K_SLOW + k] * exp(min(turn, 0.0)), LEAST_K)
+            x[K_WHITE + k] = max(x[K_WHITE + k] * exp(min(-turn, 0.0)), LEAST_K)
+        x[K_SLOW + k] = _scaled(x[K_SLOW + k], slow * rate, nis, mean)
+        x[K_WHITE + k] = _scaled(x[K_WHITE + k], (1.0 - slow) * rate, nis, mean)
 
 
 @kernel
@@ -309,7 +357,7 @@ def _velocity(x: Vec, P: Mat, p: Vec, w: Vec, age: float) -> None:
     """Gate and take the velocity of the fix."""
     nis = _nis(x, P, p, w, 1, age)
     w[D_NVEL] = nis
-    x[K_VEL] = _learn(p, x[K_VEL], nis, 1.0)
+    _learn(x, p, w, 1)
     lost = x[T] - x[T_VEL]
     if nis > p[GATE] and lost > 3.0 * p[RECOVER]:
         x[MODE] = 0.0  # nothing fits any more: align again, with the biases that are known
@@ -333,7 +381,7 @@ def _position(x: Vec, P: Mat, p: Vec, w: Vec, age: float) -> None:
     """Gate and take the position of the fix; believe a jump once it lasts."""
     nis = _nis(x, P, p, w, 0, age)
     w[D_NPOS] = nis
-    _learn_position(x, p, w, nis)
+    _learn(x, p, w, 0)
     if nis > p[GATE]:
         same = 0.0
         for i in range(2):
@@ -372,8 +420,10 @@ def update(x: Vec, P: Mat, p: Vec, w: Vec) -> None:
         return
     for i in range(3):
         x[FIX_SD + i] = x[IN_SP + i]
+        x[FIX_SV + i] = x[IN_SV + i]
     x[FIX_SPEED] = sqrt(x[IN_V] * x[IN_V] + x[IN_V + 1] * x[IN_V + 1])
     x[FIX_T] = x[IN_T]
+    x[FIXES] += 1.0
     if not isnan(x[IN_V] + x[IN_V + 1] + x[IN_V + 2]):
         _velocity(x, P, p, w, x[T] - x[IN_T] + x[DELAY])
     _position(x, P, p, w, x[T] - x[IN_T] + x[DELAY])

@@ -33,7 +33,7 @@ from strapdown.kernels.ins.layout import (
     Q,
     V,
 )
-from strapdown.kernels.quat import dcm, exp, mul, rotate_inverse
+from strapdown.kernels.quat import dcm, exp, mul, rotate, rotate_inverse
 
 A = 6378137.0  # semi-major axis [m]
 E2 = 0.0066943799901413165  # first eccentricity squared
@@ -88,13 +88,13 @@ def advance(
     The specific force acts with the attitude of the middle of the interval.
     """
     # fmt: on
-    gx = (gx - x[BG]) * (1.0 - x[SG])
-    gy = (gy - x[BG + 1]) * (1.0 - x[SG + 1])
-    gz = (gz - x[BG + 2]) * (1.0 - x[SG + 2])
+    w, a, b, c = x[Q], x[Q + 1], x[Q + 2], x[Q + 3]
+    gx, gy, gz = gx - x[BG], gy - x[BG + 1], gz - x[BG + 2]
+    _un, _ue, turn = rotate(w, a, b, c, gx, gy, gz)
+    gx, gy, gz = gx - x[SG] * turn, gy - x[SG + 1] * turn, gz - x[SG + 2] * turn
     fx = (fx - x[BA]) * (1.0 - x[SA])
     fy = (fy - x[BA + 1]) * (1.0 - x[SA + 1])
     fz = (fz - x[BA + 2]) * (1.0 - x[SA + 2])
-    w, a, b, c = x[Q], x[Q + 1], x[Q + 2], x[Q + 3]
     ix, iy, iz = rotate_inverse(w, a, b, c, x[W_IN], x[W_IN + 1], x[W_IN + 2])
     half = 0.5 * dt
     dw, da, db, dc = exp((gx - ix) * half, (gy - iy) * half, (gz - iz) * half)
@@ -127,7 +127,7 @@ def advance(
     x[S_F + 1] += fe * dt
     x[S_F + 2] += fd * dt
     _add_columns(x, S_C, dt, dt, dt, c0, c1, c2, c3, c4, c5, c6, c7, c8)
-    _add_columns(x, S_CW, gx * dt, gy * dt, gz * dt, c0, c1, c2, c3, c4, c5, c6, c7, c8)
+    _add_columns(x, S_CW, turn * dt, turn * dt, turn * dt, c0, c1, c2, c3, c4, c5, c6, c7, c8)
     _add_columns(x, S_CF, fx * dt, fy * dt, fz * dt, c0, c1, c2, c3, c4, c5, c6, c7, c8)
 
 

@@ -3,25 +3,56 @@
 The window of four blocks slides by one block, so that sums of each block are all there is to keep.
 Quiet means quiet as a parked car is: a car that creeps shakes its gyroscope three times as much.
 The parameters say how much a parked car shakes; the noise of the sensor comes on top, as the
-quietest window so far shows it.
+steps from sample to sample show it in the block with the smallest of them so far. Steps tell noise
+from motion, which is slow, so that a car need not have stood for this.
 """
 
 from strapdown.kernels._jit import Vec, kernel
 from strapdown.kernels.ins.layout import (
     AT_REST,
     BLOCK_DT,
-    FLOOR_A,
-    FLOOR_G,
+    LAST_F,
+    LAST_G,
+    NOISE_A,
+    NOISE_G,
     REST_A,
     REST_G,
     REST_T,
     RING,
     RING_BLOCK,
+    STEPS,
 )
 
 BLOCKS = 4
-SPREAD = 1.2  # of a variance over a window of noise
-MOST = 3.0  # a quietest window above so many times the parameter's square was no rest
+SPREAD = 1.4  # of a variance over a window of noise, against the least seen so far
+LEAST_STEPS = 24.0  # that make a measurement of noise
+LEAST_TIME = 0.5  # and take so long [s]
+
+
+# fmt: off
+@kernel
+def measure_noise(
+    x: Vec, dt: float, gx: float, gy: float, gz: float, fx: float, fy: float, fz: float
+) -> None:
+    """Measure the white noise of both sensors by the steps between neighbouring samples."""
+    # fmt: on
+    dx, dy, dz = gx - x[LAST_G], gy - x[LAST_G + 1], gz - x[LAST_G + 2]
+    x[STEPS] += dx * dx + dy * dy + dz * dz
+    dx, dy, dz = fx - x[LAST_F], fy - x[LAST_F + 1], fz - x[LAST_F + 2]
+    x[STEPS + 1] += dx * dx + dy * dy + dz * dz
+    x[STEPS + 2] += 1.0
+    x[STEPS + 3] += dt
+    n = x[STEPS + 2]
+    if n < LEAST_STEPS or x[STEPS + 3] < LEAST_TIME:
+        return
+    # a step has twice the variance of a sample, and three axes are in the sum
+    k = x[STEPS + 3] / (6.0 * n * n)
+    if x[NOISE_G] == 0.0 or k * x[STEPS] < x[NOISE_G]:
+        x[NOISE_G] = k * x[STEPS]
+    if x[NOISE_A] == 0.0 or k * x[STEPS + 1] < x[NOISE_A]:
+        x[NOISE_A] = k * x[STEPS + 1]
+    for i in range(4):
+        x[STEPS + i] = 0.0
 
 
 # fmt: off
@@ -77,14 +108,9 @@ def _quiet(x: Vec, p: Vec) -> bool:
             gyr += variance
         else:
             acc += variance
-    if x[FLOOR_G] == 0.0 or gyr < x[FLOOR_G]:
-        x[FLOOR_G] = gyr
-    if x[FLOOR_A] == 0.0 or acc < x[FLOOR_A]:
-        x[FLOOR_A] = acc
-    g = p[REST_G] * p[REST_G]
-    a = p[REST_A] * p[REST_A]
-    quiet: bool = gyr < g + SPREAD * min(x[FLOOR_G], MOST * g)
-    return quiet and acc < a + SPREAD * min(x[FLOOR_A], MOST * a)
+    k = SPREAD * 3.0 * count / p[REST_T]
+    quiet: bool = gyr < p[REST_G] * p[REST_G] + k * x[NOISE_G]
+    return quiet and acc < p[REST_A] * p[REST_A] + k * x[NOISE_A]
 
 
 @kernel
@@ -101,6 +127,8 @@ def mean_rate(x: Vec, axis: int) -> float:
 @kernel
 def forget(x: Vec) -> None:
     """Empty the window, after a gap."""
+    for i in range(4):
+        x[STEPS + i] = 0.0
     for i in range((BLOCKS + 1) * RING_BLOCK):
         x[RING + i] = 0.0
     x[BLOCK_DT] = 0.0

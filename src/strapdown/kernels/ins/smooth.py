@@ -118,16 +118,22 @@ def _back_over_prediction(p: Vec, w: Vec, at: int, lam: Vec, Lam: Mat) -> None:
     """``lam = Phi^T lam``, ``Lam = Phi^T Lam Phi``."""
     n = int(p[N])
     m = int(p[M])
-    f = at + 2
+    f = at + 5
     k = int(p[I_BP])
     if k > 0:
-        e = w[at + 1]
+        ep, ev, cr, cv = w[at + 1], w[at + 2], w[at + 3], w[at + 4]
         for i in range(k, k + 3):
-            lam[i] *= e
+            lam[i + 3] = ep * lam[i + 3] + cr * lam[i]
+            lam[i + 6] = ev * lam[i + 6] + cv * lam[i]
+            lam[i] *= ep
             for j in range(n):
-                Lam[i, j] *= e
+                Lam[i + 3, j] = ep * Lam[i + 3, j] + cr * Lam[i, j]
+                Lam[i + 6, j] = ev * Lam[i + 6, j] + cv * Lam[i, j]
+                Lam[i, j] *= ep
             for j in range(n):
-                Lam[j, i] *= e
+                Lam[j, i + 3] = ep * Lam[j, i + 3] + cr * Lam[j, i]
+                Lam[j, i + 6] = ev * Lam[j, i + 6] + cv * Lam[j, i]
+                Lam[j, i] *= ep
     for j in range(m):
         w[GAIN + j] = 0.0
     for i in range(9):

@@ -10,8 +10,8 @@ from strapdown.kernels import status as s
 from strapdown.kernels._jit import Mat, Vec, kernel
 from strapdown.kernels.ins.align import feed as feed_alignment
 from strapdown.kernels.ins.align import learn_bias, restart, take_fix
-from strapdown.kernels.ins.covariance import predict
-from strapdown.kernels.ins.gnss import check_fix
+from strapdown.kernels.ins.covariance import drift_share, predict
+from strapdown.kernels.ins.gnss import begin_learning, check_fix
 from strapdown.kernels.ins.gnss import update as update_gnss
 from strapdown.kernels.ins.layout import (
     A_FIX,
@@ -26,9 +26,9 @@ from strapdown.kernels.ins.layout import (
     BA,
     BG,
     BP,
+    BR,
+    BV,
     CAR,
-    CORE,
-    D_LAST,
     D_NEW,
     D_POS,
     DBA,
@@ -38,20 +38,22 @@ from strapdown.kernels.ins.layout import (
     DT,
     DV,
     FIX_SD,
+    FIX_SV,
     FIX_T,
     I_ARM_A,
     I_BP,
     I_DELAY,
+    I_SA,
+    I_SG,
     I_SODO,
     IN_LLA,
     IN_SP,
     IN_SV,
     IN_V,
     JUMPS,
-    K_POS,
-    K_VEL,
-    K_WHITE,
+    K_SLOW,
     LAST_F,
+    LAST_G,
     LLA,
     MODE,
     MOUNTED,
@@ -67,7 +69,6 @@ from strapdown.kernels.ins.layout import (
     RATE,
     REALIGN_GAP,
     RECORD,
-    RHO,
     SA,
     SCALE_V,
     SD_ARM_A,
@@ -85,9 +86,7 @@ from strapdown.kernels.ins.layout import (
     TAPE,
     TICK,
     V_CON,
-    WHITE_P,
     ZUPT,
-    M,
     N,
     Q,
     V,
@@ -95,7 +94,7 @@ from strapdown.kernels.ins.layout import (
 from strapdown.kernels.ins.layout import BARO as BARO_OFFSET
 from strapdown.kernels.ins.mechanise import advance, earth_terms
 from strapdown.kernels.ins.rest import feed as feed_rest
-from strapdown.kernels.ins.rest import forget
+from strapdown.kernels.ins.rest import forget, measure_noise
 from strapdown.kernels.ins.vehicle import (
     constrain,
     find_mount,
@@ -168,15 +167,15 @@ def start(x: Vec, P: Mat, p: Vec, w: Vec) -> None:
         x[V + i] = x[IN_V + i]
         x[ACC_N + i] = 0.0
         x[FIX_SD + i] = x[IN_SP + i]
+        x[FIX_SV + i] = x[IN_SV + i]
         P[PHI + i, PHI + i] = SD_TILT_START * SD_TILT_START
         P[DV + i, DV + i] = x[IN_SV + i] * x[IN_SV + i] + 0.01
         P[DP + i, DP + i] = x[IN_SP + i] * x[IN_SP + i] + 0.01
         P[DBG + i, DBG + i] = SD_REST_BIAS * SD_REST_BIAS if known else p[SD_BG] * p[SD_BG]
         P[DBA + i, DBA + i] = p[SD_BA] * p[SD_BA]
     P[PHI + 2, PHI + 2] = 2.0 * x[A_VAR] + 0.001
-    if p[M] > CORE:
-        prior(P, p, w, CORE, 3, p[SD_SCALE_G])
-        prior(P, p, w, CORE + 3, 3, p[SD_SCALE_A])
+    prior(P, p, w, int(p[I_SG]), 3, p[SD_SCALE_G])
+    prior(P, p, w, int(p[I_SA]), 3, p[SD_SCALE_A])
     prior(P, p, w, int(p[I_ARM_A]), 3, p[SD_ARM_A])
     prior(P, p, w, int(p[I_DELAY]), 1, p[SD_DELAY])
     prior(P, p, w, int(p[I_SODO]), 1, p[SD_SODO])
@@ -184,14 +183,11 @@ def start(x: Vec, P: Mat, p: Vec, w: Vec) -> None:
     if k > 0:
         for i in range(3):
             prior(P, p, w, k + i, 1, p[SHARE_BP] * x[FIX_SD + i])
+            prior(P, p, w, k + 3 + i, 1, drift_share(p) * p[SHARE_BP] * x[FIX_SD + i])
+            prior(P, p, w, k + 6 + i, 1, p[SCALE_V] * x[FIX_SV + i])
     for i in range(N_SUMS):
         x[DT + i] = 0.0
-    x[K_POS] = p[SHARE_BP]
-    x[K_WHITE] = p[WHITE_P]
-    x[K_VEL] = p[SCALE_V]
-    x[RHO] = 0.25
-    for i in range(3):
-        x[D_LAST + i] = 0.0
+    begin_learning(x, p)
     x[T_POS] = x[T]
     x[T_VEL] = x[T]
     x[JUMPS] = 0.0
@@ -250,11 +246,11 @@ def mind_gap(x: Vec, P: Mat, p: Vec, w: Vec, dt: float) -> None:
 def sane(x: Vec, P: Mat, p: Vec) -> bool:
     """Whether the estimates are numbers that a carrier of this sensor can have."""
     total = 0.0
-    total += x[ARM_V] + x[SODO] + x[BARO_OFFSET] + x[K_POS] + x[K_WHITE] + x[K_VEL]
+    total += x[ARM_V] + x[SODO] + x[BARO_OFFSET]
     for i in range(4):
         total += x[Q + i] + x[QVB + i]
     for i in range(3):
-        total += x[LLA + i] + x[BP + i] + x[ACC_N + i] + x[RATE + i]
+        total += x[LLA + i] + x[BP + i] + x[BR + i] + x[BV + i] + x[ACC_N + i] + x[RATE + i]
         if not (abs(x[V + i]) < 1e5 and abs(x[BG + i]) < 1.0 and abs(x[BA + i]) < 30.0):
             return False
         if not (abs(x[SG + i]) < 0.5 and abs(x[SA + i]) < 0.5 and abs(x[ARM_A + i]) < 1e3):
@@ -301,6 +297,8 @@ def navigate(x: Vec, P: Mat, p: Vec, w: Vec, dt: float) -> None:
             x[SA + i] = 0.0
             x[ARM_A + i] = 0.0
             x[BP + i] = 0.0
+            x[BR + i] = 0.0
+            x[BV + i] = 0.0
         x[DELAY] = 0.0
         x[SODO] = 0.0
         x[A_REST] = 0.0
@@ -341,7 +339,6 @@ def step(
         r = p[P_ACC_RANGE]
         if abs(ax) >= r or abs(ay) >= r or abs(az) >= r:
             set_status(x, s.SATURATED)
-        x[LAST_F], x[LAST_F + 1], x[LAST_F + 2] = ax, ay, az
         dt = t - x[T]
         if isnan(dt):  # the first sample
             x[T] = t
@@ -354,6 +351,7 @@ def step(
                 mind_gap(x, P, p, w, dt)
                 dt = 0.0
             else:
+                measure_noise(x, dt, gx, gy, gz, ax, ay, az)
                 new = feed_rest(x, p, dt, gx, gy, gz, ax, ay, az)
                 if x[MODE] > 0.0:
                     advance(x, dt, gx, gy, gz, ax, ay, az)
@@ -365,6 +363,8 @@ def step(
                 navigate(x, P, p, w, dt)
             else:
                 align(x, P, p, w)
+        x[LAST_F], x[LAST_F + 1], x[LAST_F + 2] = ax, ay, az
+        x[LAST_G], x[LAST_G + 1], x[LAST_G + 2] = gx, gy, gz
     if x[MODE] == 0.0:
         set_status(x, s.ALIGNING)
     elif x[T] - x[T_POS] > OUTAGE_AFTER:
@@ -383,7 +383,8 @@ def unseen(x: Vec, p: Vec, i: int) -> float:
     """
     if p[I_BP] < 0.0:
         return 0.0
-    rest = p[SHARE_BP] * p[SHARE_BP] - 4.0 * x[K_POS] * x[K_POS]
+    k = x[K_SLOW + i // 2]
+    rest = p[SHARE_BP] * p[SHARE_BP] - 4.0 * k * k
     variance: float = max(rest, 0.0) * x[FIX_SD + i] * x[FIX_SD + i]
     return variance
 

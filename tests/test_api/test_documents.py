@@ -69,6 +69,10 @@ def test_examples_print_what_their_text_predicts(tmp_path):
     )
     assert float(figures["mekf"]) < 1.0
     assert float(figures["gyro"]) > 2.0 * float(figures["mekf"])
+    drive = re.findall(r"([\d.]+) m RMSE, in .* ([\d.]+) m", found["a_drive_with_an_outage"])
+    alone, coupled, smoothed = ([float(part) for part in row] for row in drive)
+    assert alone[1] > 100.0 * coupled[1] > 100.0 * smoothed[1]
+    assert coupled[1] < 15.0
     assert "refused: 'g1', 'g2', 'g3' state no unit" in found["a_log_that_does_not_explain_itself"]
 
 

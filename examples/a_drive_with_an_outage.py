@@ -36,8 +36,7 @@ for name, sol in runs.items():
 sol = runs["loosely coupled"]
 aligned = sol.t[np.argmax((sol.status & sd.Status.ALIGNING) == 0)]
 roll, pitch, yaw = sd.rotation.rpy_from_quat(sol.q_vb[-1]) / DEG
-print(
-    f"aligned after {aligned - sol.t[0]:.1f} s; mount found: {roll:.1f}, {pitch:.1f}, {yaw:.1f} deg"
-)
+print(f"aligned after {aligned - sol.t[0]:.1f} s")
+print(f"mount found: {roll:.1f}, {pitch:.1f}, {yaw:.1f} deg")
 roll, pitch, yaw = sd.rotation.rpy_from_quat(drive.reference.mount.q_vb[-1]) / DEG
 print(f"mount as simulated: {roll:.1f}, {pitch:.1f}, {yaw:.1f} deg")

@@ -1,5 +1,6 @@
 """What recordings hold for the gyroscope: turntable positions, reference rates, rests."""
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -14,10 +15,11 @@ from strapdown.calibration.record import CalibrationRecord, Parameter, rms
 from strapdown.errors import InputError
 from strapdown.recording import Recording
 from strapdown.rotation import interpolate, quat_conj, quat_mul, rotvec_from_quat, rpy_from_quat
-from strapdown.units import DPS
+from strapdown.units import DEG, DPS
 
 _RATE_WINDOW = 0.1  # [s], longest over which gyroscope and reference are compared
 _WINDOW_TURN = 0.1  # [rad] in a window: rotations of this size nearly commute
+_TURNED = 5.0 * DEG  # less than that is no motion to calibrate on
 _STANDING = 10.0 * DPS  # a slower turntable stands; bias alone may show as much
 
 
@@ -26,8 +28,15 @@ def usual_method(recs: Sequence[Recording], table_rates: Sequence[float]) -> str
     if table_rates or all(rec.encoder is not None for rec in recs):
         return "table"
     if all(rec.reference is not None and rec.reference.attitude is not None for rec in recs):
-        return "reference"
+        return "reference" if any(_turns(rec) for rec in recs) else "rest"
     return "rest"
+
+
+def _turns(rec: Recording) -> bool:
+    """Return whether the reference attitude leaves where it began."""
+    q_nb = reference_attitude(rec)[1]
+    known = q_nb[np.isfinite(q_nb).all(axis=1)]
+    return bool(len(known)) and bool((np.abs(known @ known[0]) < math.cos(0.5 * _TURNED)).any())
 
 
 def table_positions(

@@ -337,4 +337,7 @@ def rms(values: ArrayLike) -> float:
 def require_poses(count: int, unknowns: int, what: str, advice: str) -> None:
     """Refuse fewer poses than unknowns."""
     if count < unknowns:
-        raise InputError(f"{what} has {unknowns} unknowns, got {count} poses; {advice}.")
+        raise InputError(
+            f"{what} has {unknowns} unknowns, got {count} "
+            f"pose{'' if count == 1 else 's'}; {advice}."
+        )

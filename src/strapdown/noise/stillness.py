@@ -143,6 +143,7 @@ def require_still(name: str, y: FloatArray, fs: float, start: float = 0.0) -> No
     moves = moving(y, fs)
     if not moves.any():
         return
+    start = 0.0 if abs(start) < 0.05 else start  # no "-0.0 s"
     first, last = _runs(moves)
     longest_first, longest_last = _runs(~moves)
     where = f"from {start + first[0] / fs:.1f} s to {start + last[0] / fs:.1f} s"

@@ -32,6 +32,8 @@ DECADES_WITH_MINOR = 1.5  # a logarithmic axis of more shows powers of ten alone
 QUARTER_DEG = 90  # ticks of angles; the page frees them when one zooms in
 LARGE_TIME = 1e5  # beyond it a float32 of seconds is too coarse to read
 
+_TITLE_PX = 18  # room for the titles of panels
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Series:
@@ -262,6 +264,10 @@ def grid_figure(
                 layout["annotations"].append(_heading(panel.title, left, top / inner))
             data += _traces(panel, x_name, y_name, buckets)
         top -= height + between
+    if any(panel.title for panel in rows[0]):  # the legend stands above the titles
+        layout["legend"]["y"] = 1.0 + _TITLE_PX / inner
+        layout["margin"]["t"] += _TITLE_PX
+        layout["height"] += _TITLE_PX
     return _finished(data, layout, inner)
 
 

@@ -3,12 +3,18 @@
 import os
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from strapdown.report import page
 from strapdown.systems._parts import SYSTEMS, Part
 from strapdown.systems._rows import Shown, Verdict
 
 COLUMNS = ("item", "thesis", "here", "unit", "tolerance", "verdict", "remark")
+
+
+def _cell(value: Any) -> Any:
+    """Return a cell in the letters of print: the console has ``+-`` for any terminal."""
+    return value.replace("+-", "±") if isinstance(value, str) else value
 
 
 def write(system: str, found: Sequence[tuple[Part, Shown]], path: str | os.PathLike[str]) -> Path:
@@ -34,10 +40,12 @@ def write(system: str, found: Sequence[tuple[Part, Shown]], path: str | os.PathL
     )
     sections = [page.Section(title="Verdicts", blocks=(counts,))]
     for part, shown in found:
-        cells = [[getattr(row, column) for column in COLUMNS] for row in shown.rows]
+        cells = [[_cell(getattr(row, column)) for column in COLUMNS] for row in shown.rows]
         table = page.table(COLUMNS, cells)
         sections.append(
-            page.Section(title=part.title, intro=part.source, blocks=(table, *shown.blocks))
+            page.Section(
+                title=part.title, intro=f"Thesis, {part.source}.", blocks=(table, *shown.blocks)
+            )
         )
     return page.write(
         page.Page(

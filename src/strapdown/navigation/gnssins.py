@@ -101,7 +101,7 @@ class Gnssins(AdaptiveEkf):
     states: Literal[12, 9] = 12
     form: Literal["consistent", "printed"] = "consistent"
     acc_noise: float = 0.06
-    acc_walk: float = 0.1
+    acc_walk: float = 0.3
     acc_bias_walk: float = 1e-3
     std_acc: float = 0.5
     std_acc_bias: float = 0.2

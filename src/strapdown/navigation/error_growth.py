@@ -130,7 +130,7 @@ def drift(
     >>> round(float(drift(100.0, acc_bias=1 * MG).total), 1)
     49.0
     """
-    time = _checks.as_floats("t", t)
+    time, gravity = _times(t), _checks.finite("gravity", gravity)
     way = _checks.finite("speed", speed) * time
     half_square = 0.5 * time**2
     return Drift(
@@ -147,6 +147,12 @@ def drift(
         * _checks.finite("heading_change", heading_change)
         * way,
     )
+
+
+def _times(t: ArrayLike) -> FloatArray:
+    """Return times of any shape, all finite [s]."""
+    time = _checks.as_floats("t", t)
+    return _checks.as_series("t", time.ravel()).reshape(time.shape)
 
 
 def schuler_period(gravity: float = G0, radius: float = MEAN_RADIUS) -> float:
@@ -264,7 +270,10 @@ def schuler_error(
     >>> round(float(error.position))  # never more than twice bias R / g
     1274
     """
-    time = _checks.as_floats("t", t)
+    time = _times(t)
+    position, velocity = _checks.finite("position", position), _checks.finite("velocity", velocity)
+    tilt = _checks.finite("tilt", tilt)
+    acc_bias, gyr_bias = _checks.finite("acc_bias", acc_bias), _checks.finite("gyr_bias", gyr_bias)
     w = 2.0 * math.pi / schuler_period(gravity, radius)
     c, s = np.cos(w * time), np.sin(w * time)
     one_less_c = 2.0 * np.sin(0.5 * w * time) ** 2
@@ -503,4 +512,4 @@ def unstable_growth(t: ArrayLike, gravity: float = G0, radius: float = WGS84_A) 
     rate = math.sqrt(
         2.0 * _checks.positive("gravity", gravity) / _checks.positive("radius", radius)
     )
-    return np.cosh(rate * _checks.as_floats("t", t))
+    return np.cosh(rate * _times(t))

@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from strapdown import _checks
 from strapdown._types import FloatArray
 from strapdown.report import decimate
 from strapdown.report.figures import (
@@ -57,6 +58,7 @@ FLAGS: dict[Status, Flag] = {
 
 def doubts(sol: Solution) -> list[str]:
     """Return why a solution is not to be trusted, one sentence each; none if nothing speaks so."""
+    _checks.instance("sol", sol, Solution, "an estimator's `run` gives one")
     found = []
     if len(sol) and ((sol.status & Status.ALIGNING) != 0).all():
         what = "position" if sol.is_navigation else "attitude"

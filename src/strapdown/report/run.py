@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from strapdown import _checks
 from strapdown.errors import DataGap
 from strapdown.evaluation import (
     AttitudeErrors,
@@ -81,6 +82,8 @@ def compose(
     tiles: Tiles | None = None,
 ) -> Page:
     """Return the page that `write` writes."""
+    _checks.instance("sol", sol, Solution, "an estimator's `run` gives one")
+    _checks.recording("rec", rec)
     if errors is None:
         errors = _errors(sol, rec)
     of_position = errors if isinstance(errors, NavigationErrors) else None

@@ -330,6 +330,7 @@ def _require_gyro(
     rate: FloatArray, rate_std: float, deviation: float, lat: float, limit: float
 ) -> None:
     """Refuse a gyroscope that cannot see the Earth turn."""
+    _checks.positive("max_heading_std", limit, allow_inf=True)
     if not deviation <= limit:
         need = limit * OMEGA_IE * math.cos(lat)
         raise InputError(

@@ -109,6 +109,7 @@ def velocity_matching(
     -----
     Offline. The covariance grows with the residuals where they are larger than stated.
     """
+    _checks.positive("max_heading_std", max_heading_std, allow_inf=True)
     seen = fixes(rec, span, velocity_std)
     samples = stretch(rec, (float(seen.t[0]), float(seen.t[-1])))
     arm = _checks.positive("arm_std", arm_std, allow_zero=True)

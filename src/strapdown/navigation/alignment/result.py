@@ -87,13 +87,20 @@ class Stretch(NamedTuple):
         return float(self.t[0]), float(self.t[-1])
 
 
+def _ends(span: object) -> tuple[float, float]:
+    """Return first and last time of a span, checked [s]."""
+    start, stop = _checks.as_vector("span", span, 2)  # type: ignore[arg-type]
+    if not start < stop:
+        raise ValueError(f"`span` must end after it starts, got {start:g} to {stop:g} s.")
+    return float(start), float(stop)
+
+
 def stretch(rec: Recording, span: tuple[float, float] | None) -> Stretch:
     """Return the valid inertial samples of a span, the whole recording by default."""
+    _checks.recording("rec", rec)
     imu = rec.need("imu")
     if span is not None:
-        start, stop = (_checks.finite("span", part) for part in span)
-        if not start < stop:
-            raise ValueError(f"`span` must end after it starts, got {start:g} to {stop:g} s.")
+        start, stop = _ends(span)
         imu = imu.rows((imu.t >= start) & (imu.t <= stop))
     imu = imu.rows(~imu.nan_rows())
     if len(imu) < 3:
@@ -113,13 +120,11 @@ class Fixes(NamedTuple):
 
 def fixes(rec: Recording, span: tuple[float, float] | None, velocity_std: float) -> Fixes:
     """Return the fixes with velocity of a span."""
-    rec.need("imu")
+    _checks.recording("rec", rec)
+    imu = rec.need("imu").t
     gnss = rec.need("gnss")
     default = _checks.positive("velocity_std", velocity_std)
-    first, last = (-math.inf, math.inf) if span is None else span
-    if not first < last:
-        raise ValueError(f"`span` must end after it starts, got {first:g} to {last:g} s.")
-    imu = rec.need("imu").t
+    first, last = (-math.inf, math.inf) if span is None else _ends(span)
     if len(imu):
         first, last = max(first, float(imu[0])), min(last, float(imu[-1]))
     rows = (gnss.t >= first) & (gnss.t <= last) & np.isfinite(gnss.lla).all(axis=1)
@@ -143,6 +148,7 @@ def fixes(rec: Recording, span: tuple[float, float] | None, velocity_std: float)
 
 def at_rest(rec: Recording, span: tuple[float, float] | None, test: RestTest) -> Stretch:
     """Return the samples of a span in which the box rests; refuse one in which it moves."""
+    _checks.instance("test", test, RestTest, "`strapdown.motion.DEFAULT` is one")
     samples = stretch(rec, span)
     first, last = samples.span
     if last - first < test.window:

@@ -137,8 +137,7 @@ class Mechanisation:
         _checks.whole("samples", self.samples, 1, increments.MOST_SAMPLES)
         if not isinstance(self.compensate, bool):
             raise TypeError(f"`compensate` must be True or False, got {self.compensate!r}.")
-        if self.max_gap != math.inf:
-            _checks.positive("max_gap", self.max_gap)
+        _checks.positive("max_gap", self.max_gap, allow_inf=True)
         object.__setattr__(self, "_p", self._params(self.samples))
 
     def _params(self, samples: int) -> FloatArray:
@@ -170,6 +169,7 @@ class Mechanisation:
         """
         from strapdown.kernels.mechanisation.run import prime
 
+        _checks.instance("start", start, Start, "`Start.of` makes one from a solution")
         if start.t is None:
             raise ValueError("`start` must have a time `t` here, got None.")
         lla, v_n, q_nb = (np.asarray(a) for a in (start.lla, start.v_n, start.q_nb))
@@ -268,6 +268,7 @@ class Mechanisation:
         -------
         Solution
         """
+        _checks.instance("start", start, Start, "`Start.of` makes one from a solution")
         samples = samples_of(rec)
         t = samples.t
         if len(t) == 0:

@@ -164,11 +164,13 @@ def means_from_points(t: ArrayLike, values: ArrayLike) -> FloatArray:
     from scipy.interpolate import CubicSpline
 
     times, points = as_times("t", t), as_floats("values", values)
-    if len(times) < 2 or points.shape[:1] != times.shape:
+    if len(times) < 2 or points.ndim != 2 or points.shape[:1] != times.shape:
         raise ValueError(
             f"`values` must have as many rows as `t`, and at least two, got {points.shape} and "
             f"{times.shape}."
         )
+    if not np.isfinite(points).all():
+        raise ValueError("`values` must be finite: a spline goes through all of them.")
     pieces = CubicSpline(times, points).c  # of each interval, highest power first
     h = np.diff(times)[:, np.newaxis]
     mean = pieces[0]

@@ -70,6 +70,8 @@ class Start:
         -------
         Start
         """
+        if not isinstance(sol, Solution | Truth):
+            raise TypeError(f"`sol` must be a Solution or a Truth, got {type(sol).__name__}.")
         if sol.lla is None or sol.v_n is None:
             raise ValueError("`sol` must have position and velocity, this one has attitude only.")
         return cls(t=float(sol.t[row]), lla=sol.lla[row], v_n=sol.v_n[row], q_nb=sol.q_nb[row])

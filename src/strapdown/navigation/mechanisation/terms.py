@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from strapdown import _checks
 from strapdown._types import FloatArray
 from strapdown.constants import OMEGA_IE
 from strapdown.earth import dcm_ne, earth_rate_n, ecef_from_lla, gravity_n, transport_rate_n
@@ -74,7 +75,7 @@ def velocity_terms(lla: ArrayLike, v_n: ArrayLike) -> VelocityTerms:
     >>> (1e3 * terms.transport_n).round(1)
     array([-9.8,  0. , -9.8])
     """
-    place, v = np.asarray(lla, dtype=np.float64), np.asarray(v_n, dtype=np.float64)
+    place, v = _checks.as_vectors("lla", lla), _checks.as_vectors("v_n", v_n)
     gravity = gravity_n(place)
     out_e = ecef_from_lla(place) * np.array((1.0, 1.0, 0.0))  # from the Earth's axis
     return VelocityTerms(

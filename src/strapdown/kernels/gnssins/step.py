@@ -111,15 +111,15 @@ def integrate(
     a, b, c, d = x[Q], x[Q + 1], x[Q + 2], x[Q + 3]
     ew, ex, ey, ez = exp(wx * dt, wy * dt, wz * dt)
     if p[P_EULER] > 0.0:
-        na, nb, nc, nd = step_first_order(a, b, c, d, wx, wy, wz, dt, p[P_EULER])
+        a1, b1, c1, d1 = step_first_order(a, b, c, d, wx, wy, wz, dt, p[P_EULER])
     else:
-        na, nb, nc, nd = mul(a, b, c, d, ew, ex, ey, ez)
-    na, nb, nc, nd = normalize(na, nb, nc, nd)
-    x[Q], x[Q + 1], x[Q + 2], x[Q + 3] = na, nb, nc, nd
+        a1, b1, c1, d1 = mul(a, b, c, d, ew, ex, ey, ez)
+    a1, b1, c1, d1 = normalize(a1, b1, c1, d1)
+    x[Q], x[Q + 1], x[Q + 2], x[Q + 3] = a1, b1, c1, d1
     if p[P_AT_TRIGGER] == 0.0:
-        transition_step(w, na, nb, nc, nd, ew, ex, ey, ez, dt)
+        transition_step(w, a1, b1, c1, d1, ew, ex, ey, ez, dt)
         predict(P, w)
-        add_noise(P, na, nb, nc, nd, p[P_GYR_VAR + mode] * dt, p[P_BIAS_VAR + mode] * dt)
+        add_noise(P, a1, b1, c1, d1, p[P_GYR_VAR + mode] * dt, p[P_BIAS_VAR + mode] * dt)
 
 
 @kernel

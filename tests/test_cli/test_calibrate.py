@@ -149,6 +149,17 @@ def test_gyro_against_a_reference_attitude(command, tmp_path):
     assert np.abs(record.correct(raw) - true).max() < 1e-3
 
 
+def test_gyro_at_rest_gives_the_bias_though_the_log_has_a_reference(command, tmp_path):
+    """A reference attitude that stands still tells no scale factors."""
+    sd.write(sd.simulation.load("static").record(seed=3), "rest.parquet")
+    done = command("calibrate", "gyro", "rest.parquet", "--no-report")
+    assert done.status == 0, done.err
+    assert "bias alone" in done.err
+    done = command("calibrate", "gyro", "rest.parquet", "--method", "reference", "--no-report")
+    assert done.status == 2
+    assert "must excite all axes" in done.err
+
+
 def test_gyro_at_rest_gives_the_bias_alone(command, tmp_path):
     rng = np.random.default_rng(0)
     bias = np.array([1.0, -3.9, 0.2]) * DPS

@@ -219,9 +219,9 @@ def _clipped(name: str, sensor: Sensor) -> Finding | None:
             at = column == extreme
             count = int(at.sum())
             span = float(np.ptp(column))
-            step = max(_resolution(column), 1e-7 * abs(extreme))
+            step = max(_step(column), 1e-7 * abs(extreme))
             beside = (np.abs(column - extreme) < max(2.5 * step, 0.005 * span)) & ~at
-            if count < _CLIPPED_TIMES * beside.sum() or span <= 50.0 * step:
+            if count < _CLIPPED_TIMES * beside.sum() or span <= 50.0 * _resolution(column):
                 continue
             # A coarse sensor at rest stands on its extremes too, and a stuck one always.
             if count < _CLIPPED_LEAST:
@@ -244,6 +244,13 @@ def _run_of(mask: BoolArray) -> int:
     """Return the length of the longest run of true values."""
     edges = np.flatnonzero(np.diff(np.r_[0, mask.astype(np.int8), 0]))
     return int((edges[1::2] - edges[::2]).max()) if len(edges) else 0
+
+
+def _step(values: FloatArray) -> float:
+    """Return a usual small step between samples: one count of a coarse sensor, else noise."""
+    steps = np.abs(np.diff(values[:20_000]))
+    steps = steps[steps > 0.0]
+    return float(np.quantile(steps, 0.25)) if len(steps) else 0.0
 
 
 def _resolution(values: FloatArray) -> float:

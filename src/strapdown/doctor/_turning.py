@@ -134,6 +134,7 @@ class Turning:
             Of the windows that decide best; None if there are too few.
         """
         found: Evidence | None = None
+        weight = -1.0
         for span in SPANS_S:
             windows = self._windows.get((field, span))
             if windows is None:
@@ -155,8 +156,9 @@ class Turning:
             least = typical if found is None else min(typical, found.residual)
             clear = typical < _CLEAR * float(np.median(unturned))
             evidence = Evidence(asked, blocks[:, -1], least, clear)
-            if found is None or evidence.lead() > found.lead():
-                found = evidence
+            # Windows that leave much are those in which acceleration passes for turning.
+            if found is None or evidence.lead() / typical > weight:
+                found, weight = evidence, evidence.lead() / typical
             elif least < found.residual:
                 found = replace(found, residual=least)
         return found

@@ -12,6 +12,7 @@ Function           Needs                     Heading from
 `analytic`         rest, a good gyroscope    gravity and Earth's rate at once (TRIAD)
 `course`           straight drive, GNSS      the direction of travel; mount known
 `velocity_matching` motion, GNSS             accelerations; any mount
+`mount`            motion, GNSS              gives the mount itself: box in the vehicle
 ================== ========================= ===========================================
 """
 
@@ -23,16 +24,19 @@ from strapdown.navigation.alignment.at_rest import (
     magnetic,
 )
 from strapdown.navigation.alignment.matching import velocity_matching
+from strapdown.navigation.alignment.mounting import Mount, mount
 from strapdown.navigation.alignment.result import Alignment
 from strapdown.navigation.alignment.travel import course
 
 __all__ = [
     "Alignment",
+    "Mount",
     "analytic",
     "course",
     "gyrocompass",
     "heading_std",
     "level",
     "magnetic",
+    "mount",
     "velocity_matching",
 ]

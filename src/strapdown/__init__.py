@@ -26,6 +26,7 @@ if TYPE_CHECKING:
         rotation,
         sensors,
         simulation,
+        systems,
         units,
     )
     from strapdown import estimator as estimators
@@ -49,6 +50,7 @@ _MODULES = (
     "rotation",
     "sensors",
     "simulation",
+    "systems",
     "units",
 )
 _NAMES = {
@@ -82,6 +84,7 @@ __all__ = [
     "rotation",
     "sensors",
     "simulation",
+    "systems",
     "units",
     "write",
 ]

@@ -55,9 +55,10 @@ class Tiles:
 
     Examples
     --------
-    >>> Tiles("no such file")
+    >>> Tiles("nowhere.mbtiles")
     Traceback (most recent call last):
-    strapdown.errors.FormatError: no such file: there is no such file or folder
+        ...
+    strapdown.errors.FormatError: nowhere.mbtiles: there is no such file or folder.
     """
 
     def __init__(self, path: str | os.PathLike[str]) -> None:

@@ -104,6 +104,14 @@ def test_before_navigation_the_fix_is_what_is_known(city, rec):
     np.testing.assert_allclose(blind.std_position_n[first], rec.gnss.std_position_n[0])
 
 
+def test_navigation_begins_as_sure_as_its_fix(rec):
+    for own, want in ((True, [0.5, 0.25]), (False, [3.0, 2.0])):
+        sol = replace(FLT, receiver_sigmas=own).run(rec.between(-1.0, 5.0))
+        begun = np.argmax((sol.status & Status.ALIGNING) == 0)
+        got = sol.std_position_n[begun, 0], sol.std_velocity_n[begun, 0]
+        np.testing.assert_allclose(got, want, rtol=1e-12)
+
+
 def test_mounted_box_gives_the_same_track(city):
     mount = (0.3, -0.2, 1.4)
     C_vb = Rotation.from_euler("ZYX", mount[::-1]).as_matrix()

@@ -1,13 +1,14 @@
 """The loosely coupled filter on the road drives: outages, start, consistency, heading, speed.
 
-Usage: python benchmarks/drives.py [--turned] [--data FOLDER]
+Usage: python benchmarks/drives.py [--turned] [--varied] [--data FOLDER]
 
 `--turned` repeats the outages with the box turned about other axes, by rotating its raw data.
+`--varied` repeats them with the logs changed as another drive or a worse sensor would be.
 """
 
 import argparse
 import time
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -59,7 +60,10 @@ def consistency(name, rec):
         taken = rows.outcome == Outcome.ACCEPTED
         nis = np.mean((rows.innovation[taken] / rows.sigma[taken]) ** 2)
         share = 100 * taken.mean()
-        cells.append(f"{key[5:]} NIS per axis {nis:.2f}, {share:.1f} % taken")
+        z = (rows.innovation / rows.sigma)[taken]
+        lag = [np.corrcoef(z[1:, i], z[:-1, i])[0, 1] for i in range(3)]
+        lags = " ".join(f"{c:+.2f}" for c in lag)
+        cells.append(f"{key[5:]} NIS per axis {nis:.2f}, lag one {lags}, {share:.1f} % taken")
     errors = sd.evaluation.navigation_errors(sol, rec.reference)
     attitude = rec.reference.attitude
     k = np.clip(np.searchsorted(sol.t, attitude.t), 0, len(sol.t) - 1)
@@ -105,11 +109,66 @@ def turned(rec, rotvec_deg):
     return replace(rec, imu=Imu(t=imu.t, gyr=imu.gyr @ C.T, acc=imu.acc @ C.T))
 
 
+def _with_imu(rec, gyr=0.0, acc=0.0, scale=1.0):
+    imu = rec.imu
+    return replace(rec, imu=replace(imu, gyr=scale * imu.gyr + gyr, acc=imu.acc + acc))
+
+
+def _with_sigmas(rec, factor):
+    fixes = rec.gnss
+    return replace(
+        rec,
+        gnss=replace(
+            fixes,
+            std_position_n=factor * fixes.std_position_n,
+            std_velocity_n=factor * fixes.std_velocity_n,
+        ),
+    )
+
+
+def _every_second_fix(rec):
+    fixes = rec.gnss
+    names = (f.name for f in fields(fixes) if f.name != "meta")
+    kept = {n: v[::2] for n in names if isinstance(v := getattr(fixes, n), np.ndarray)}
+    return replace(rec, gnss=replace(fixes, **kept))
+
+
+def _noisy(rec):
+    rng = np.random.default_rng(0)
+    shape = rec.imu.gyr.shape
+    return _with_imu(rec, 2e-3 * rng.standard_normal(shape), 0.1 * rng.standard_normal(shape))
+
+
+# As another drive, another receiver or a worse sensor would have it.
+VARIATIONS = {
+    "as recorded": lambda rec: rec,
+    "the first 90 s cut off": lambda rec: rec.between(rec.imu.t[0] + 90.0, rec.imu.t[-1]),
+    "gyroscope off by 1 deg/s more": lambda rec: _with_imu(rec, np.radians([1.0, -1.0, 1.0])),
+    "accelerometer off by 0.3 m/s^2 more": lambda rec: _with_imu(rec, acc=[0.3, -0.2, 0.3]),
+    "gyroscope's scale off by 1 %": lambda rec: _with_imu(rec, scale=1.01),
+    "noise of 0.11 deg/s and 0.1 m/s^2 added": _noisy,
+    "stated sigmas times three": lambda rec: _with_sigmas(rec, 3.0),
+    "stated sigmas over three": lambda rec: _with_sigmas(rec, 1.0 / 3.0),
+    "every second fix": _every_second_fix,
+}
+
+
+def varied(drives):
+    """Print the outages of changed logs, and the slowest start."""
+    print("\n| Change | 10 s | 30 s | 60 s | slowest start |\n|---|---|---|---|---|")
+    for what, change in VARIATIONS.items():
+        study = outage_study([(n, change(r)) for n, r in drives], LooselyCoupled())
+        cells = " | ".join(f"{r['median_m']:.2f} / {r['p95_m']:.2f}" for r in study.summary())
+        slowest = max(s.first_solution_s - s.first_motion_s for s in study.starts)
+        print(f"| {what} | {cells} | {slowest:.1f} s |")
+
+
 def main():
     """Run what the arguments ask for."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--data", type=Path, default=DATA)
     parser.add_argument("--turned", action="store_true")
+    parser.add_argument("--varied", action="store_true")
     options = parser.parse_args()
     drives = [(p.name, sd.read(p)) for p in sorted(options.data.iterdir()) if p.is_dir()]
     error_table(drives, smooth=False)
@@ -126,6 +185,8 @@ def main():
                 for r in study.summary()
             )
             print(f"box turned by {turn} deg: {rows}")
+    if options.varied:
+        varied(drives)
 
 
 if __name__ == "__main__":

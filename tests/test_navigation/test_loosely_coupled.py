@@ -6,6 +6,7 @@ from itertools import pairwise
 import drive
 import numpy as np
 import pytest
+from scipy import stats
 
 from strapdown import estimator
 from strapdown.navigation import LooselyCoupled
@@ -353,23 +354,55 @@ def test_what_is_learned_of_the_receiver_is_what_was_simulated(solved):
     assert max(learned["fix_fast_scale"]) < 0.15  # 0.025 of 0.5 m
 
 
-def test_normalised_errors_of_simulated_drives_are_one():
-    z = []
-    for seed in range(25):
-        d = drive.simulate(seed=100 + seed, duration=150.0, rate=50.0)
-        sol = FLT.run(d.rec)
-        k = -1
-        z.append(
-            np.concatenate(
-                (
-                    drive.attitude_error(sol.q_nb[k], d.C_nb[k]) / sol.std_attitude_n[k],
-                    (sol.v_n[k] - d.v_n[k]) / sol.std_velocity_n[k],
-                    drive.ned_error(sol.lla[k].copy(), d.lla[k]) / sol.std_position_n[k],
-                    (sol.gyr_bias[k] - d.gyr_bias) / sol.std_gyr_bias[k],
-                    (sol.acc_bias[k] - d.acc_bias) / sol.std_acc_bias[k],
-                )
-            )
+def end_error(sol, d):
+    """Truth less estimate at the end, in the order of the error state."""
+    return np.concatenate(
+        (
+            drive.attitude_error(sol.q_nb[-1], d.C_nb[-1]),
+            d.v_n[-1] - sol.v_n[-1],
+            -drive.ned_error(sol.lla[-1].copy(), d.lla[-1]),
+            d.gyr_bias - sol.gyr_bias[-1],
+            d.acc_bias - sol.acc_bias[-1],
         )
+    )
+
+
+def end_of(flt, seed, **simulated):
+    """Error and covariance at the end of a drive, and the innovations over their sigmas."""
+    rng = np.random.default_rng(1000 + seed)
+    biases = {"gyr_bias": rng.normal(0.0, 0.005, 3), "acc_bias": rng.normal(0.0, 0.1, 3)}
+    d = drive.simulate(seed=seed, duration=150.0, rate=50.0, **biases, **simulated)
+    sol, state = flt.advance(flt.init(), d.rec)
+    z = []
+    for key in ("gnss_position", "gnss_velocity"):
+        rows = sol.diagnostics[key]
+        late = rows.t > 60.0  # alignment is not drawn from the model
+        z.append((rows.innovation / rows.sigma)[late].ravel())
+    return end_error(sol, d), state.P[:15, :15], np.concatenate(z)
+
+
+def test_nees_and_nis_of_a_hundred_drives_of_its_own_model_lie_in_their_bounds():
+    flt = LooselyCoupled(
+        states=(), vehicle="none", learning=0.0, fix_share=1.0, velocity_share=1.0,
+        velocity_lag=0.0, gyr_noise=1e-4, acc_noise=5e-3, gyr_bias_walk=0.0, acc_bias_walk=0.0,
+        gyr_scale_noise=1e-9, acc_scale_noise=1e-9,
+    )  # fmt: skip
+    model = {
+        "slow": 0.0, "white": 0.5, "velocity_error": 0.25, "gyr_scale": 0.0, "acc_scale": 0.0,
+        "antenna_v": (0.0, 0.0, 0.0), "vibration": 0.0, "bounce": 0.0, "slip": 0.0,
+    }  # fmt: skip
+    ends = [end_of(flt, 500 + seed, **model) for seed in range(100)]
+    nees = [e @ np.linalg.solve(P, e) for e, P, _ in ends]
+    low, high = stats.chi2.ppf([0.005, 0.995], 15 * len(nees)) / len(nees)
+    assert low < np.mean(nees) < high
+    z2 = np.concatenate([z for *_, z in ends]) ** 2
+    low, high = stats.chi2.ppf([0.005, 0.995], len(z2)) / len(z2)
+    assert low < np.mean(z2) < high
+
+
+def test_normalised_errors_of_simulated_drives_are_one():
+    ends = [end_of(FLT, 100 + seed) for seed in range(25)]
+    z = [e / np.sqrt(np.diag(P)) for e, P, _ in ends]
     rms = np.sqrt(np.mean(np.square(z), axis=0))
     # chi-square of 25: 99.9 % between 0.6 and 1.5; the constraint is modelled as wider than
     # the simulated shake, which makes biases and height look better known than they are used

@@ -147,6 +147,17 @@ def test_wrong_range_or_scale_of_the_accelerometer_is_found(box, factor, severit
     assert words in finding.sentence
 
 
+def test_accelerometer_that_is_never_calm_is_not_accused_of_its_scale(box, data_dir):
+    """Waved about for 40 s, no window shows gravity alone: its norm is 7 m/s^2 in the calmest."""
+    waved = sd.read(data_dir / "broad" / "16_undisturbed_fast_translation_B.mat").between(101, 141)
+    for rec, severity in (
+        (waved, "note"),
+        (changed_imu(box, acc=0.7 * box.imu.acc), "warning"),
+    ):
+        (finding,) = [f for f in by_check(rec, "units") if f.stream == "acc"]
+        assert finding.severity == severity
+
+
 def test_rates_beyond_any_sensor_are_found_where_nothing_else_tells():
     rng = np.random.default_rng(3)
     gyr = 60.0 * rng.standard_normal((3000, 3))

@@ -141,7 +141,7 @@ def _relation(sensor: str, ask: _Ask, scale: float) -> Relation | None:
     if not answer.explained:
         return Relation(sensor, scale, [], SURE)
     alive, confidence = survivors(answer.loss[:, 0])
-    if IDENTITY not in alive and not answer.turned:
+    if IDENTITY not in alive and not (answer.turned and answer.clear):
         # The field hardly turned: what speaks against the axes are accelerations, or a bias.
         possible, share = survivors(answer.course[:, 0])
         if IDENTITY in possible:

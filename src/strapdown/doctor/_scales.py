@@ -25,6 +25,7 @@ EARTH_FIELD_T: Final = (22.0 * UT, 67.0 * UT)
 _FIELD_TYPICAL_T: Final = 45.0 * UT
 _FIELD_POSSIBLE_T: Final = (12.0 * UT, 130.0 * UT)  # with magnets and steel nearby
 _RANGES: Final = (0.5, 2.0, 0.25, 4.0)  # of counts scaled with another range
+_CALM: Final = 0.15  # spread of the norm in the calmest windows, of its size
 _SCALE_WITHIN: Final = 0.005  # of an accelerometer that tells mg from cm/s^2
 _FASTEST_GYR: Final = 36.0  # [rad/s] 2000 deg/s
 
@@ -142,6 +143,16 @@ def acc_units(log: Log) -> Finding | None:
             f"{mean:.2g} in the mean.",
             confidence=0.95,
             advice="Log the raw specific force, not 'linear' or 'user' acceleration.",
+            stream="acc",
+        )
+    if spread > _CALM and 0.5 < ratio < 2.0:
+        return Finding(
+            check="units",
+            severity=Severity.NOTE,
+            sentence=f"The accelerometer shows {size:.2f} m/s² at its calmest, and is never calm: "
+            "whether its scale is right cannot be told from this motion.",
+            confidence=0.8,
+            advice="Let it rest for some seconds.",
             stream="acc",
         )
     power = round(math.log2(ratio))

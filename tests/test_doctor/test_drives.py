@@ -99,6 +99,13 @@ def test_noise_of_positions_does_not_hide_their_rate(drive):
     assert finding.severity == "error"
 
 
+def test_one_fix_at_rest_says_nothing_of_a_stale_heading(drive):
+    speed = np.hypot(drive.gnss.v_n[:, 0], drive.gnss.v_n[:, 1])
+    keep = (speed > 0.5) | (np.arange(len(speed)) == int(np.argmax(speed < 0.5)))
+    (finding,) = by_check(replace(drive, gnss=drive.gnss.rows(np.flatnonzero(keep))), "heading")
+    assert "stale at rest" not in finding.sentence
+
+
 def test_fixes_lost_under_a_bridge_are_a_note(drive):
     t = drive.gnss.t
     rec = replace(drive, gnss=drive.gnss.rows(np.flatnonzero((t < 60.0) | (t > 90.0))))

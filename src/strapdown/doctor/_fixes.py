@@ -99,7 +99,7 @@ def _heading(gnss: Gnss) -> Finding | None:
         advice = "Check its unit and what it is measured from."
         return _finding("heading", Severity.WARNING, text, advice)
     at_rest = ~moving & (speed < 0.5)
-    held = at_rest.any() and (np.diff(gnss.heading[at_rest]) == 0.0).mean() > 0.5
+    held = at_rest.sum() > 1 and (np.diff(gnss.heading[at_rest]) == 0.0).mean() > 0.5
     text = f"The stated heading follows the course within {typical / DEG:.1f}° (median)"
     text += ", and is stale at rest." if held else "."
     return _finding("heading", Severity.NOTE if held else Severity.OK, text)

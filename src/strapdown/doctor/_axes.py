@@ -141,7 +141,8 @@ def _relation(sensor: str, ask: _Ask, scale: float) -> Relation | None:
     if not answer.explained:
         return Relation(sensor, scale, [], SURE)
     alive, confidence = survivors(answer.loss[:, 0])
-    if IDENTITY not in alive and not (answer.turned and answer.clear):
+    one = len({int(i) % 48 for i in alive}) == 1 and confidence >= SURE
+    if IDENTITY not in alive and not (answer.turned and (one or answer.clear)):
         # The field hardly turned: what speaks against the axes are accelerations, or a bias.
         possible, share = survivors(answer.course[:, 0])
         if IDENTITY in possible:

@@ -407,3 +407,26 @@ def test_impossible_fixes_and_temperatures_are_left_out():
     clean = hand.degrees_off(AdaptiveEkf().run(rec).q_nb, r_nb).max()
     # two seconds without a speed: a vertical that is off by 14 deg counts a few times
     assert hand.degrees_off(sol.q_nb, r_nb).max() < clean + 3.0
+
+
+@pytest.mark.parametrize("propagation", ["sampled", "printed"])
+@pytest.mark.parametrize("integration", ["exact", "square", "inverse"])
+def test_measurements_surer_than_rounding_and_wild_samples_leave_all_finite(
+    propagation, integration
+):
+    """P_0 of 1e10 beside R of 1e-24; turns of many radians between samples up to 30 s apart."""
+    rng = np.random.default_rng(6)
+    t = np.cumsum(10.0 ** rng.uniform(-3.0, 1.5, 600))
+    gyr, acc = 10.0 ** rng.uniform(-3, 4, (2, 600, 1)) * rng.standard_normal((2, 600, 3))
+    rec = Recording(
+        imu=Imu(t=t, gyr=gyr, acc=acc), mag=Mag(t=t, mag=2e-5 * rng.standard_normal((600, 3)))
+    )
+    flt = AdaptiveEkf(
+        propagation=propagation, integration=integration, quat_std=(1e-12,) * 3, std_attitude=1e5,
+        std_gyr_bias=1e5, limit=7.0,
+    )  # fmt: skip
+    sol, state = flt.advance(flt.init(), rec)
+    for name in ("q_nb", "gyr_bias", "std_attitude_n", "std_gyr_bias"):
+        assert np.isfinite(getattr(sol, name)).all(), name
+    np.testing.assert_allclose(np.linalg.norm(sol.q_nb, axis=1), 1.0, atol=1e-12)
+    assert np.isfinite(state.P).all()

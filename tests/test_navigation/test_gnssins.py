@@ -320,6 +320,29 @@ def test_position_filter_is_off_by_what_its_covariance_says(states):
         assert low < nis < high
 
 
+@pytest.mark.parametrize("flt", [FLT, Gnssins.as_printed()], ids=["default", "printed"])
+def test_covariance_stays_definite_for_a_day(flt):
+    """A box at rest with a fix a minute: 86,400 s at 1 Hz."""
+    rng = np.random.default_rng(7)
+    t = np.arange(86400.0)
+    acc = [0.0, 0.0, -9.8] + 0.05 * rng.standard_normal((len(t), 3))
+    at = t[30::60]
+    rec = Recording(
+        imu=Imu(t=t, gyr=1e-3 * rng.standard_normal((len(t), 3)), acc=acc),
+        mag=Mag(t=t, mag=FIELD_N + 2e-7 * rng.standard_normal((len(t), 3))),
+        gnss=Gnss(
+            t=at, lla=PLACE + 1e-7 * rng.standard_normal((len(at), 3)), v_n=0.0 * acc[30::60]
+        ),
+    )
+    sol, state = replace(flt, max_gap=2.0).advance(flt.init(), rec)
+    position = np.linalg.eigvalsh(state.P[7:, 7:])
+    assert position.min() > 0.0
+    attitude = np.linalg.eigvalsh(state.P[:7, :7])  # nothing along q itself
+    assert attitude[0] > -1e-15 * attitude[-1]
+    assert attitude[1] > 0.0
+    assert np.isfinite(sol.lla[100:]).all()
+
+
 # --- bad input --------------------------------------------------------------------------
 
 

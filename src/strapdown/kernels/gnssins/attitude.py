@@ -14,6 +14,10 @@ from strapdown.kernels.gnssins.update import expect, update
 from strapdown.kernels.memory import BG, STD_ATT, STD_BG, Q
 from strapdown.kernels.quat import normalize
 
+UNKNOWN = 1e12  # above the printed P_0, far above the 1 that a component can be off
+LEAST_R = 1e-14  # no attitude is measured better than to 2e-7 rad, which P's rounding allows
+NONSENSE = 10.0  # residuals are at most 1
+MOST_BIAS = 1e6  # [rad/s]
 MAX_EXPONENT = 200.0  # R beyond this is no measurement, and no overflow
 
 
@@ -26,7 +30,7 @@ def adaptive_r(
     if root > 0.0:
         exponent = sqrt(exponent)
     total = log(10.0) * exponent + log(base) * abs(rate)
-    return var * exp(min(total, MAX_EXPONENT))
+    return max(var * exp(min(total, MAX_EXPONENT)), LEAST_R)
 
 
 @kernel
@@ -134,6 +138,13 @@ def reset_covariance(
     x[Q], x[Q + 1], x[Q + 2], x[Q + 3] = a, b, c, d
 
 
+@kernel
+def bound(x: Vec, P: Mat, w: Vec) -> None:
+    """Forget what is known of a quaternion whose covariance has grown beyond all reason."""
+    if not P[0, 0] + P[1, 1] + P[2, 2] + P[3, 3] < UNKNOWN:
+        reset_covariance(x, P, w, x[Q], x[Q + 1], x[Q + 2], x[Q + 3], 1.0, True)
+
+
 # fmt: off
 @kernel
 def correct(
@@ -159,6 +170,14 @@ def correct(
             if k < 3:
                 w[row + k] = left
                 w[row + 3 + k] = sqrt(s)
+    size = abs(w[W_DX]) + abs(w[W_DX + 1]) + abs(w[W_DX + 2]) + abs(w[W_DX + 3])
+    turn = abs(w[W_DX + 4]) + abs(w[W_DX + 5]) + abs(w[W_DX + 6])
+    if not (size < NONSENSE and turn < MOST_BIAS):  # rounding has made P indefinite
+        reset_covariance(x, P, w, a, b, c, d, 1.0, True)
+        for i in range(4, 7):
+            for j in range(4, 7):
+                P[i, j] = 1.0 if i == j else 0.0
+        return
     x[Q], x[Q + 1], x[Q + 2], x[Q + 3] = normalize(
         a + w[W_DX], b + w[W_DX + 1], c + w[W_DX + 2], d + w[W_DX + 3]
     )

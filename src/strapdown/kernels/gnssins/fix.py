@@ -70,6 +70,7 @@ LEAST_COSINE = 1e-5  # 64 m from the pole
 HALF_PI = 1.5707963267948966
 PI = 3.141592653589793
 FAR = 1e5  # heights beyond are no fix [m]
+LOST = 1e7  # the filter's own height [m], speed [m/s], bias [m/s^2] beyond are nonsense
 FAST = 1e4  # speeds beyond are no measurement [m/s]
 LATE = 0.02  # by which the time between two fixes may vary [s]
 LONGEST = 3.0  # between fixes whose speeds make an acceleration [s]
@@ -174,6 +175,15 @@ def begin_navigation(x: Vec, P: Mat, p: Vec) -> None:
     x[SINCE_PV] = 0.0
     x[SINCE_FIX] = 0.0
     x[FIX_REFUSED] = 0.0
+
+
+@kernel
+def possible(x: Vec) -> bool:
+    """Whether position, velocity and bias are numbers that a box on Earth may have."""
+    sum_v = abs(x[V]) + abs(x[V + 1]) + abs(x[V + 2])
+    sum_b = abs(x[BA]) + abs(x[BA + 1]) + abs(x[BA + 2])
+    there = abs(x[LLA]) <= HALF_PI and abs(x[LLA + 1]) <= PI and abs(x[LLA + 2]) < LOST
+    return bool(there and sum_v < LOST and sum_b < LOST)
 
 
 @kernel

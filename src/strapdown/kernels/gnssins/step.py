@@ -1,15 +1,22 @@
 """Thesis E's system, one IMU sample at a time; with or without the position filter."""
 
-from math import inf, isfinite, isinf, nan, pi
+from math import inf, isfinite, isinf, nan, pi, sqrt
 
 from strapdown.kernels import status as s
 from strapdown.kernels._jit import Mat, Vec, kernel
-from strapdown.kernels.gnssins.attitude import add_noise, predict, reset_covariance, write_std
+from strapdown.kernels.gnssins.attitude import (
+    add_noise,
+    bound,
+    predict,
+    reset_covariance,
+    write_std,
+)
 from strapdown.kernels.gnssins.compensation import compensate
 from strapdown.kernels.gnssins.control import observe, parameters_of, trigger, wants_trigger
 from strapdown.kernels.gnssins.fix import (
     begin_navigation,
     earth_here,
+    possible,
     propagate,
     shift,
     take_fix,
@@ -97,6 +104,7 @@ from strapdown.kernels.memory import (
 )
 from strapdown.kernels.quat import exp, mul, normalize, rotate
 
+LONGEST = 6.0  # beyond this F T the series is none
 TERMS = 12  # of the series of exp(F T); 3 rad/s over 1 s leave 1.5^13 / 13! = 3e-8
 W_SIZE = LAYOUT_W_SIZE
 
@@ -120,6 +128,7 @@ def integrate(
         transition_step(w, a1, b1, c1, d1, ew, ex, ey, ez, dt)
         predict(P, w)
         add_noise(P, a1, b1, c1, d1, p[P_GYR_VAR + mode] * dt, p[P_BIAS_VAR + mode] * dt)
+        bound(x, P, w)
 
 
 @kernel
@@ -129,11 +138,15 @@ def propagate_as_printed(
     """Covariance over the whole period, by F and D of now, (7.2.28) and (7.2.30)."""
     a, b, c, d = x[Q], x[Q + 1], x[Q + 2], x[Q + 3]
     dt = x[SINCE_TRG]
+    if dt * (0.5 * sqrt(wx * wx + wy * wy + wz * wz) + p[P_LAW]) > LONGEST:
+        reset_covariance(x, P, w, a, b, c, d, 1.0, True)  # the attitude may be any
+        return
     write_f(w, a, b, c, d, wx, wy, wz, p[P_LAW])
     write_d(w, a, b, c, d)
     transition_series(w, dt, TERMS)
     predict(P, w)
     add_noise(P, a, b, c, d, p[P_GYR_VAR + mode] * dt, p[P_BIAS_VAR + mode] * dt)
+    bound(x, P, w)
 
 
 @kernel
@@ -176,6 +189,10 @@ def navigate(
         elif x[SINCE_PV] >= p[P_PERIOD] - 0.5 * dt:
             propagate(x, P, p)
             earth_here(x)
+        if not possible(x):
+            for i in range(3):
+                x[BA + i] = 0.0
+            begin_navigation(x, P, p)
         write_position_std(x, P, p)
     elif fresh:
         for i in range(3):  # nothing but the fix is known

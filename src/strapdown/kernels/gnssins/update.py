@@ -10,15 +10,15 @@ def expect(P: Mat, w: Vec, first: int, size: int, at: int, m: int, r: float) -> 
 
     Writes ``P h``. `first` and `size` say which block of P; `at` counts from `first`.
     """
-    s = r
     for i in range(size):
         v = 0.0
         for j in range(m):
             v += P[first + i, first + at + j] * w[W_H + j]
         w[W_PH + i] = v
+    hph = 0.0
     for j in range(m):
-        s += w[W_H + j] * w[W_PH + at + j]
-    return s
+        hph += w[W_H + j] * w[W_PH + at + j]
+    return max(hph, 0.0) + r  # rounding may have left P below zero
 
 
 # fmt: off

@@ -55,6 +55,9 @@ SHORTEST = 0.4  # fixes closer than this are left out: their velocity noise is o
 LONGEST = 15.0  # [s]
 WORST_FIT = 25.0  # mean square residual, of what is expected, above which nothing is believed
 LEAST_COUNT = 2.5  # fixes, faded, before anything is believed
+ENOUGH_COUNT = 10.0  # and before residuals may say that the receiver states too much
+MARGIN = 6.0  # and so many times more than they show is believed of its errors
+LEAST_FIT = 0.05  # but never less than this, of what the weights expect
 MOST_RESTS = 20.0  # blocks over which the bias is averaged
 
 
@@ -247,8 +250,12 @@ def solve(x: Vec, p: Vec, w: Vec) -> bool:
     if not variance > 0.0:
         return False
     x[Q], x[Q + 1], x[Q + 2], x[Q + 3] = qw, qa, qb, qc
-    # residuals in units of what the weights expect; the loss is theirs
-    fit = max((x[A_SQUARES] - 2.0 * trace) / x[A_COUNT] / 3.0, 1.0)
-    x[A_VAR] = variance * fit
+    # residuals in units of what the weights expect; the loss is theirs. A receiver that states far
+    # too much shows in residuals that are far too small, of which `MARGIN` times is believed.
+    fit = (x[A_SQUARES] - 2.0 * trace) / x[A_COUNT] / 3.0
+    trust = 1.0
+    if x[A_COUNT] > ENOUGH_COUNT:
+        trust = min(max(MARGIN * fit, LEAST_FIT), 1.0)
+    x[A_VAR] = variance * max(fit, trust)
     known: bool = x[A_VAR] < p[SD_HEADING] * p[SD_HEADING] and x[A_COUNT] > LEAST_COUNT
     return known and fit < WORST_FIT

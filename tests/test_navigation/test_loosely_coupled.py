@@ -9,8 +9,9 @@ import pytest
 from scipy import stats
 
 from strapdown import estimator
+from strapdown.kernels.ins import layout
 from strapdown.navigation import LooselyCoupled
-from strapdown.recording import Baro, Gnss, Imu, Recording, Speed
+from strapdown.recording import Baro, Gnss, Imu, Mag, Recording, Speed
 from strapdown.solution import Outcome, Status
 
 FLT = LooselyCoupled()
@@ -201,6 +202,83 @@ def test_a_barometer_holds_the_height_in_an_outage():
     before = int(np.searchsorted(d.t, 89.9))
     drift = (sol.lla[k, 2] - d.lla[k, 2]) - (sol.lla[before, 2] - d.lla[before, 2])
     assert abs(drift) < 1.0  # of the barometer's own offset, which walks
+
+
+IRON_B = np.array([40e-6, -25e-6, 15e-6])  # more than the Earth's horizontal field
+
+
+def with_field(d, rec, rate=20.0, declination=0.05, seed=0, odd=0.0):
+    """The recording with a magnetometer that nobody calibrated; `odd` is a field of 8 s."""
+    every = round(1.0 / (rate * (d.t[1] - d.t[0])))
+    t, C_nb = d.t[::every], d.C_nb[::every]
+    earth_n = 1e-6 * np.array([20.0 * np.cos(declination), 20.0 * np.sin(declination), 43.0])
+    field = np.einsum("kji,j->ki", C_nb, earth_n) + IRON_B
+    field += np.random.default_rng(seed).normal(0.0, 0.5e-6, field.shape)
+    field[(t > 70.0) & (t < 78.0)] += odd * np.array([0.6, 0.8, 0.0])
+    return replace(rec, mag=Mag(t=t, mag=field))
+
+
+def test_a_magnetometer_that_is_not_calibrated_keeps_heading_in_an_outage():
+    flt = LooselyCoupled(gyr_noise=3e-3)  # a gyroscope that loses heading in minutes
+    off, off_without = [], []
+    for seed in range(4):
+        d = drive.simulate(seed=seed, duration=280.0, gyr_noise=3e-3)
+        rec = without(d.rec, (150.0, 280.0))
+        sol, state = flt.advance(flt.init(), with_field(d, rec, seed=seed))
+        plain = flt.run(rec)
+        off.append(drive.attitude_error(sol.q_nb[-1], d.C_nb[-1])[2])
+        off_without.append(drive.attitude_error(plain.q_nb[-1], d.C_nb[-1])[2])
+        assert sol.std_attitude_n[-1, 2] < 0.9 * plain.std_attitude_n[-1, 2]
+        assert abs(off[-1]) < 3.5 * sol.std_attitude_n[-1, 2]
+        iron = state.x[layout.IRON : layout.IRON + 2]  # a level car does not show the third
+        np.testing.assert_allclose(iron, IRON_B[:2], atol=2e-6)
+    assert np.sqrt(np.mean(np.square(off))) < 0.7 * np.sqrt(np.mean(np.square(off_without)))
+
+
+def test_a_disturbed_field_does_not_turn_the_car():
+    d = drive.simulate(seed=5, duration=160.0)
+    calm = FLT.run(with_field(d, d.rec))
+    rough = FLT.run(with_field(d, d.rec, odd=60e-6))
+    turned = drive.attitude_error(rough.q_nb[-1], d.C_nb[-1])[2]
+    turned -= drive.attitude_error(calm.q_nb[-1], d.C_nb[-1])[2]
+    assert abs(turned) < 0.2 * calm.std_attitude_n[-1, 2]
+    np.testing.assert_allclose(rough.q_nb, calm.q_nb, atol=0.01)
+
+
+def test_without_a_magnetometer_its_states_change_nothing(city, solved):
+    states = tuple(name for name in FLT.states if name != "magnetometer")
+    alone = LooselyCoupled(states=states).run(city.rec)
+    np.testing.assert_array_equal(alone.q_nb, solved.q_nb)
+    np.testing.assert_array_equal(alone.lla, solved.lla)
+
+
+def test_a_field_in_pieces_and_step_by_step_gives_the_same_solution(city):
+    rec = with_field(city, city.rec).between(0.0, 60.0)
+    rec = replace(
+        rec, mag=replace(rec.mag, mag=rec.mag.mag * np.where(rec.mag.t < 50, 1, np.nan)[:, None])
+    )
+    whole = FLT.run(rec)
+    state, parts = FLT.init(), []
+    for a, b in pairwise((-1.0, 33.3, 48.0, 61.0)):
+        sol, state = FLT.advance(state, rec.between(a, b))
+        parts.append(sol.q_nb)
+    rows = np.unique(np.concatenate(parts), axis=0)
+    assert len(rows) <= len(np.unique(whole.q_nb, axis=0))
+    np.testing.assert_array_equal(parts[-1][-1], whole.q_nb[-1])
+    trk = FLT.tracker()
+    j = m = 0
+    for k in range(len(rec.imu)):
+        t = rec.imu.t[k]
+        while j < len(rec.gnss) and rec.gnss.t[j] <= t:
+            g = rec.gnss
+            trk.add_gnss(g.t[j], g.lla[j], g.v_n[j], g.std_position_n[j], g.std_velocity_n[j])
+            j += 1
+        field = None
+        while m < len(rec.mag) and rec.mag.t[m] <= t:
+            field = rec.mag.mag[m]
+            m += 1
+        trk.update(t, rec.imu.gyr[k], rec.imu.acc[k], field)
+    np.testing.assert_array_equal(trk.q_nb, whole.q_nb[-1])
 
 
 # --- standstill -----------------------------------------------------------------------------

@@ -13,10 +13,11 @@ from strapdown.kernels import memory as _m
 from strapdown.kernels import status as _s
 from strapdown.recording import Recording
 from strapdown.solution import COLUMNS, Diagnostics, Solution
-from strapdown.units import DEG
+from strapdown.units import DEG, UT
 
 STATES: Final = (
     "gyro_scale", "acc_scale", "mount", "antenna", "delay", "fix_error", "odometer", "barometer",
+    "magnetometer",
 )  # fmt: skip
 # Where the index of an optional block stands in `p`, and its number of states.
 _BLOCKS: Final = {
@@ -28,6 +29,7 @@ _BLOCKS: Final = {
     "fix_error": (("I_BP", 9),),
     "odometer": (("I_SODO", 1),),
     "barometer": (("I_BARO", 1),),
+    "magnetometer": (("I_MAG", 4),),
 }
 _EVENT: Final = 17  # time, cell, count, 14 values of a fix
 _TAPE: Final = 1_000_000  # numbers on the smoother's tape: 8 MB, about 80 s at 10 Hz
@@ -43,7 +45,7 @@ _AXES: Final = ("north", "east", "down")
     source="error-state INS/GNSS filter (Groves 2013, ch. 14); smoother of Bierman 1973",
     cost="15 to 40 states at 10 Hz, mechanisation at the IMU's rate",
     needs=("gnss",),
-    uses=("speed", "baro"),
+    uses=("speed", "baro", "mag"),
     gives="navigation",
     rank=100,
 )
@@ -54,7 +56,8 @@ class LooselyCoupled(Estimator):
     State: attitude, velocity, position, gyro and accelerometer bias (15 error states), and by
     `states` the mount of the box in the vehicle with the arm to its point without side slip, the
     arm to the antenna, the delay between the clocks of receiver and IMU, the slow errors of the
-    fixes, scale errors, a wheel speed's scale and a barometer's offset. Strapdown mechanisation
+    fixes, scale errors, a wheel speed's scale, a barometer's offset, and iron and declination of a
+    magnetometer, which need not be calibrated. Strapdown mechanisation
     in NED on WGS-84; error state ``phi_n, dv_n, dp_n, db_g, db_a`` with
     ``q_true = exp(phi_n) q_nb``.
 
@@ -71,8 +74,9 @@ class LooselyCoupled(Estimator):
     ----------
     states : tuple of str
         Optional blocks that are estimated, of ``gyro_scale``, ``acc_scale``, ``mount``,
-        ``antenna``, ``delay``, ``fix_error``, ``odometer``, ``barometer``. Without ``mount`` the
-        mount is found once and then kept.
+        ``antenna``, ``delay``, ``fix_error``, ``odometer``, ``barometer``, ``magnetometer``.
+        Without ``mount`` the mount is found once and then kept; without ``barometer`` or
+        ``magnetometer`` that sensor is not used.
     vehicle : {'car', 'none'}
         ``'none'``: any carrier; no mount, no constraint, no standstill.
     standstill : bool
@@ -137,6 +141,10 @@ class LooselyCoupled(Estimator):
         Heading sigma at which alignment ends [rad].
     std_speed, std_height : float
         Sigma of wheel speed [m/s] and of pressure height [m].
+    std_field : float
+        Sigma of the field across magnetic north where nothing disturbs it [T].
+    field_time : float
+        How long a disturbance of the field lasts [s]. Larger follows the field more slowly.
     gyr_range, acc_range : float
         Ends of the sensors' ranges; samples there are flagged.
 
@@ -193,6 +201,7 @@ class LooselyCoupled(Estimator):
         "fix_error",
         "odometer",
         "barometer",
+        "magnetometer",
     )
     vehicle: Literal["car", "none"] = "car"
     standstill: bool = True
@@ -232,6 +241,8 @@ class LooselyCoupled(Estimator):
     std_start: float = 0.22
     std_speed: float = 0.2
     std_height: float = 0.5
+    std_field: float = 1.0 * UT
+    field_time: float = 10.0
     gyr_range: float = math.inf
     acc_range: float = math.inf
 
@@ -296,6 +307,7 @@ class LooselyCoupled(Estimator):
             "ZUPT": float(self.standstill), "SD_REST_V": 0.05, "SD_REST_G": 3e-4,
             "REST_G": self.rest_gyr, "REST_A": self.rest_acc, "REST_T": 1.0,
             "SD_SPEED": self.std_speed, "SD_BARO": self.std_height, "SD_SODO": 0.03,
+            "SD_MAG": self.std_field, "T_MAG": self.field_time,
             "TICK": self.tick, "REALIGN_GAP": self.realign_gap, "SD_HEADING": self.std_start,
         }.items():  # fmt: skip
             p[getattr(k, cell)] = value
@@ -452,12 +464,14 @@ class LooselyCoupled(Estimator):
             parts.append(e)
         for stream, cell, name in (
             (rec.speed, _m.SPEED, "speed"), (rec.baro, _m.BARO, "pressure"),
+            (rec.mag, _m.MAG, "mag"),
         ):  # fmt: skip
             if stream is not None:
+                values = getattr(stream, name).reshape(len(stream), -1)
                 e = np.zeros((len(stream), _EVENT))
                 e[:, 0] = stream.t
-                e[:, 1:3] = cell, 1
-                e[:, 3] = getattr(stream, name)
+                e[:, 1:3] = cell, values.shape[1]
+                e[:, 3 : 3 + values.shape[1]] = values
                 parts.append(e)
         if not parts:
             return np.empty((0, _EVENT))
@@ -510,7 +524,7 @@ _POSITIVE: Final = (
     "std_mount", "std_arm_v", "std_antenna", "std_delay", "fix_share", "fix_time",
     "velocity_share", "velocity_time", "gate", "recover", "std_side", "std_up",
     "constraint_time", "rest_gyr", "rest_acc", "tick", "max_gap", "realign_gap", "std_start",
-    "std_speed", "std_height",
+    "std_speed", "std_height", "std_field", "field_time",
 )  # fmt: skip
 _NOT_NEGATIVE: Final = (
     "gyr_bias_walk", "acc_bias_walk", "gyr_scale_noise", "acc_scale_noise", "mount_walk",

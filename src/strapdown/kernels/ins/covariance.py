@@ -34,6 +34,7 @@ from strapdown.kernels.ins.layout import (
     BV,
     DBA,
     DBG,
+    DECLINATION,
     DELAY,
     DP,
     DT,
@@ -47,10 +48,12 @@ from strapdown.kernels.ins.layout import (
     I_BARO,
     I_BP,
     I_DELAY,
+    I_MAG,
     I_MOUNT,
     I_SA,
     I_SG,
     I_SODO,
+    IRON,
     K_SLOW,
     LLA,
     MOVED,
@@ -95,6 +98,7 @@ from strapdown.kernels.ins.layout import (
 )
 from strapdown.kernels.quat import exp, mul, normalize
 
+IRON_WALK = 1e-7  # of the iron, currents and temperature [T/sqrt(s)]
 BARO_WALK = 0.05  # of the barometer's offset, weather and wind [m/sqrt(s)]
 
 
@@ -218,6 +222,10 @@ def _noise(x: Vec, P: Mat, p: Vec, dt: float) -> None:
     k = int(p[I_BARO])
     if k > 0:
         P[k, k] += BARO_WALK * BARO_WALK * dt
+    k = int(p[I_MAG])
+    if k > 0 and P[k, k] > 0.0:
+        for i in range(k, k + 3):
+            P[i, i] += IRON_WALK * IRON_WALK * dt
 
 
 @kernel
@@ -408,6 +416,10 @@ def apply(x: Vec, p: Vec, w: Vec, d: int) -> None:
         _add(x, BV, w, d, k + 6, 3)
     _add(x, SODO, w, d, int(p[I_SODO]), 1)
     _add(x, BARO, w, d, int(p[I_BARO]), 1)
+    k = int(p[I_MAG])
+    _add(x, IRON, w, d, k, 3)
+    if k > 0:
+        _add(x, DECLINATION, w, d, k + 3, 1)
 
 
 @kernel

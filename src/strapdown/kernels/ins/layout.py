@@ -87,7 +87,11 @@ RHO = HEAD + 221  # correlation of one innovation with the next, averaged: 4
 D_LAST = HEAD + 225  # last normalised innovations, position, velocity: 6
 FIXES = HEAD + 231  # number of fixes since the filter began
 BR = HEAD + 232  # drift of the slow error of their position, NED [m/s]: 3
-X_SIZE = HEAD + 235
+# --- x: magnetometer ---------------------------------------------------------------------------
+IRON = HEAD + 235  # iron of box and carrier, b [T]: 3
+DECLINATION = HEAD + 238  # [rad]
+MAG_T = HEAD + 239  # time of the last field taken [s]
+X_SIZE = HEAD + 240
 # --- x: the inbox of fixes, in the head -----------------------------------------------------
 IN_T = GNSS + 1  # its time [s]
 IN_LLA = GNSS + 2
@@ -102,7 +106,7 @@ DP = 6
 DBG = 9
 DBA = 12
 CORE = 15
-MAX_N = 40
+MAX_N = 44
 
 # --- p: size and optional blocks -------------------------------------------------------
 N = P_HEAD  # length of the error state
@@ -164,7 +168,11 @@ Q_SG = P_HEAD + 51  # noise of the gyroscope per rate [sqrt(s)]
 Q_SA = P_HEAD + 52  # noise of the accelerometer per acceleration [sqrt(s)]
 I_SG = P_HEAD + 53
 I_SA = P_HEAD + 54
-P_SIZE = P_HEAD + 55
+# --- p: magnetometer --------------------------------------------------------------------------
+I_MAG = P_HEAD + 55  # iron, declination
+SD_MAG = P_HEAD + 56  # of the field across magnetic north [T]
+T_MAG = P_HEAD + 57  # how long its disturbances last [s]
+P_SIZE = P_HEAD + 58
 
 # --- w: the last fix, for diagnostics -----------------------------------------------------------
 D_POS = W_HEAD  # innovation of position, NED [m]: 3

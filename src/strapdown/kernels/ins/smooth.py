@@ -26,11 +26,13 @@ from strapdown.kernels.ins.layout import (
     DX,
     GAIN,
     I_BP,
+    I_MOUNT,
     MODE,
     MOVED,
     NEXT,
     PH,
     PHI,
+    QVB,
     R_E,
     R_MARK,
     R_PREDICT,
@@ -247,6 +249,10 @@ def _write(
             w[PH + i] = w[DX + i] + part * (d[i] - w[DX + i])
         for i in range(NOMINAL):
             x[HEAD + i] = nominal[row - first, i]
+        k_mount = int(p[I_MOUNT])
+        if k_mount > 0 and x[QVB] == 1.0:  # not found yet: no part of what comes later
+            for i in range(k_mount, k_mount + 3):
+                w[PH + i] = 0.0
         x[STATUS] = out[row, 0]
         apply(x, p, w, PH)
         say(x)

@@ -11,6 +11,7 @@ from strapdown.kernels._jit import Mat, Vec, kernel
 from strapdown.kernels.ins.align import feed as feed_alignment
 from strapdown.kernels.ins.align import learn_bias, restart, take_fix
 from strapdown.kernels.ins.covariance import drift_share, predict
+from strapdown.kernels.ins.field import take_field
 from strapdown.kernels.ins.gnss import begin_learning, check_fix
 from strapdown.kernels.ins.gnss import update as update_gnss
 from strapdown.kernels.ins.layout import (
@@ -33,6 +34,7 @@ from strapdown.kernels.ins.layout import (
     D_POS,
     DBA,
     DBG,
+    DECLINATION,
     DELAY,
     DP,
     DT,
@@ -50,6 +52,7 @@ from strapdown.kernels.ins.layout import (
     IN_SP,
     IN_SV,
     IN_V,
+    IRON,
     JUMPS,
     K_SLOW,
     LAST_F,
@@ -109,6 +112,7 @@ from strapdown.kernels.memory import (
     BARO,
     FULL,
     GNSS,
+    MAG,
     MAX_ACC2,
     MAX_RATE2,
     MIN_ACC2,
@@ -191,6 +195,7 @@ def start(x: Vec, P: Mat, p: Vec, w: Vec) -> None:
     x[T_POS] = x[T]
     x[T_VEL] = x[T]
     x[JUMPS] = 0.0
+    x[MAG] = 0.0
     x[MODE] = 1.0
     x[ALIGNED] = FULL
     if x[MOUNTED] > 0.0:
@@ -246,11 +251,12 @@ def mind_gap(x: Vec, P: Mat, p: Vec, w: Vec, dt: float) -> None:
 def sane(x: Vec, P: Mat, p: Vec) -> bool:
     """Whether the estimates are numbers that a carrier of this sensor can have."""
     total = 0.0
-    total += x[ARM_V] + x[SODO] + x[BARO_OFFSET]
+    total += x[ARM_V] + x[SODO] + x[BARO_OFFSET] + x[DECLINATION]
     for i in range(4):
         total += x[Q + i] + x[QVB + i]
     for i in range(3):
         total += x[LLA + i] + x[BP + i] + x[BR + i] + x[BV + i] + x[ACC_N + i] + x[RATE + i]
+        total += x[IRON + i]
         if not (abs(x[V + i]) < 1e5 and abs(x[BG + i]) < 1.0 and abs(x[BA + i]) < 30.0):
             return False
         if not (abs(x[SG + i]) < 0.5 and abs(x[SA + i]) < 0.5 and abs(x[ARM_A + i]) < 1e3):
@@ -284,6 +290,9 @@ def navigate(x: Vec, P: Mat, p: Vec, w: Vec, dt: float) -> None:
             take_speed(x, P, p, w)
     if x[BARO] > 0.0:
         take_height(x, P, p, w)
+    if full and x[MAG] > 0.0:
+        take_field(x, P, p, w)
+        x[MAG] = 0.0
     x[SPEED] = 0.0
     x[BARO] = 0.0
     if fix:
@@ -299,6 +308,8 @@ def navigate(x: Vec, P: Mat, p: Vec, w: Vec, dt: float) -> None:
             x[BP + i] = 0.0
             x[BR + i] = 0.0
             x[BV + i] = 0.0
+            x[IRON + i] = 0.0
+        x[DECLINATION] = 0.0
         x[DELAY] = 0.0
         x[SODO] = 0.0
         x[A_REST] = 0.0

@@ -249,13 +249,9 @@ class AdaptiveEkf(AttitudeEstimator):
         -------
         AdaptiveEkf
         """
-        from strapdown.earth import magnetic_field
+        from strapdown.attitude.heading import reference_field
 
-        field = magnetic_field(lla, date)
-        north, east, down = (float(part) for part in field.field_n)
-        reference = (math.hypot(north, east), down)
-        found = {"declination": field.declination, "mag_reference": reference}
-        return cls(**{**found, **parameters})
+        return cls(**{**reference_field(lla, date), **parameters})
 
     @staticmethod
     def _kernel() -> Any:

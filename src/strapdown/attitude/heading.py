@@ -1,8 +1,12 @@
 """From magnetic to true north, by the world magnetic model."""
 
+import math
+from datetime import date as calendar_date
 from datetime import datetime, timedelta
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from strapdown import _checks
 from strapdown._types import FloatArray
@@ -31,6 +35,29 @@ def declination(rec: Recording) -> float | None:
     start = next((float(s.t[0]) for _, s in rec.streams() if len(s)), 0.0)
     date = datetime.fromisoformat(str(epoch)) + timedelta(seconds=start)
     return magnetic_field(place, date).declination
+
+
+def reference_field(lla: ArrayLike, date: calendar_date | float) -> dict[str, Any]:
+    """Return the parameters of filters that are told the Earth's field.
+
+    Parameters
+    ----------
+    lla : array_like, shape (3,)
+        Latitude, longitude, height [rad, rad, m].
+    date : date or float
+        Date or decimal year.
+
+    Returns
+    -------
+    dict
+        ``declination`` [rad] and ``mag_reference``, horizontal and downward [T].
+    """
+    field = magnetic_field(lla, date)
+    north, east, down = (float(part) for part in field.field_n)
+    return {
+        "declination": field.declination,
+        "mag_reference": (math.hypot(north, east), down),
+    }
 
 
 def _place(rec: Recording) -> FloatArray | None:

@@ -1,9 +1,11 @@
 """The loosely coupled filter on the road drives: outages, start, consistency, heading, speed.
 
-Usage: python benchmarks/drives.py [--turned] [--varied] [--data FOLDER]
+Usage: python benchmarks/drives.py [--turned] [--varied] [--starts] [--data FOLDER]
 
 `--turned` repeats the outages with the box turned about other axes, by rotating its raw data.
 `--varied` repeats them with the logs changed as another drive or a worse sensor would be.
+`--starts` cuts each drive every 30 s while it moves, and compares the heading that the filter
+begins with, and later ones, with the smoothed heading of the whole drive.
 """
 
 import argparse
@@ -163,12 +165,46 @@ def varied(drives):
         print(f"| {what} | {cells} | {slowest:.1f} s |")
 
 
+def starts(drives):
+    """Print how wrong heading is after beginning in motion, and how often by more than stated."""
+    flt, after = LooselyCoupled(), (0.0, 10.0, 30.0, 60.0)
+    off, ratio = [], []
+    for _, rec in drives:
+        whole = flt.smooth(rec)
+        aligned = whole.t[np.argmax((whole.status & Status.ALIGNING) == 0)]
+        for cut in np.arange(aligned + 60.0, rec.imu.t[-1] - 60.0, 30.0):
+            part = rec.between(cut, min(cut + 120.0, rec.imu.t[-1]))
+            if np.hypot(*part.gnss.v_n[:6, :2].T).mean() < 2.0:
+                continue
+            sol = flt.run(part, diagnostics=False)
+            known = (sol.status & Status.ALIGNING) == 0
+            if not known.any():
+                print(f"cut at {cut:.0f} s: no start in {sol.t[-1] - cut:.0f} s")
+                continue
+            rows = np.searchsorted(sol.t, sol.t[np.argmax(known)] + np.array(after))
+            rows = np.minimum(rows, len(sol.t) - 1)
+            d = quat_mul(
+                sol.q_nb[rows], quat_conj(whole.q_nb[np.searchsorted(whole.t, sol.t[rows])])
+            )
+            angle = np.abs((2 * np.arctan2(d[:, 3], d[:, 0]) + np.pi) % (2 * np.pi) - np.pi)
+            off.append(np.degrees(angle))
+            ratio.append(angle / sol.std_attitude_n[rows, 2])
+    off, ratio = np.array(off), np.array(ratio)
+    print(f"\n{len(off)} starts in motion\n| after | median | above 25 deg | above 3 sigma |")
+    print("|---|---|---|---|")
+    for t, angle, z in zip(after, off.T, ratio.T, strict=True):
+        print(
+            f"| {t:.0f} s | {np.median(angle):.1f} deg | {np.sum(angle > 25)} | {np.sum(z > 3)} |"
+        )
+
+
 def main():
     """Run what the arguments ask for."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--data", type=Path, default=DATA)
     parser.add_argument("--turned", action="store_true")
     parser.add_argument("--varied", action="store_true")
+    parser.add_argument("--starts", action="store_true")
     options = parser.parse_args()
     drives = [(p.name, sd.read(p)) for p in sorted(options.data.iterdir()) if p.is_dir()]
     error_table(drives, smooth=False)
@@ -187,6 +223,8 @@ def main():
             print(f"box turned by {turn} deg: {rows}")
     if options.varied:
         varied(drives)
+    if options.starts:
+        starts(drives)
 
 
 if __name__ == "__main__":

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from strapdown.kernels.ins import covariance, field, gnss, mechanise, vehicle
 from strapdown.kernels.ins import layout as k
@@ -224,3 +225,28 @@ def test_a_scalar_measurement_is_the_textbook_update(cell):
     np.testing.assert_allclose(w[k.DX : k.DX + N], gain * y, rtol=1e-12, atol=1e-12)
     np.testing.assert_allclose(P, want - np.outer(gain, gain) * s, atol=1e-10)
     np.testing.assert_array_equal(P, P.T)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_mount_that_was_found_is_off_by_what_the_attitude_is_off(seed):
+    """Vehicle axes from the course: ``q_vb = conj(q_nv) q_nb``, an error of one is the other's."""
+    x = memory(seed)
+    rng = np.random.default_rng(seed)
+    root = 0.02 * rng.standard_normal((N, N))
+    P = root @ root.T
+    before = P.copy()
+    vehicle.tie_mount(x, P, P_VEC, scratch())
+    m = int(P_VEC[k.I_MOUNT])
+    q_vb, q_nb = (Rotation.from_quat(x[i : i + 4][[1, 2, 3, 0]]) for i in (k.QVB, k.Q))
+    C_vn = (q_vb * q_nb.inv()).as_matrix()
+    others = [i for i in range(N) if not m <= i < m + 3]
+    # a prior of 3 rad where there is none: 1 / 900 of the variance goes missing
+    scale = np.abs(before).max()
+    np.testing.assert_allclose(
+        P[np.ix_(others, others)], before[np.ix_(others, others)], atol=1e-2 * scale
+    )
+    tied = C_vn @ before[:3]
+    np.testing.assert_allclose(P[m : m + 3][:, others], tied[:, others], atol=1e-2 * scale)
+    own = C_vn @ before[:3, :3] @ C_vn.T + FLT.std_mount**2 * np.eye(3)
+    np.testing.assert_allclose(P[m : m + 3, m : m + 3], own, atol=1e-2 * scale)
+    assert np.abs(tied[:, :3]).max() > 0.1 * scale

@@ -58,12 +58,18 @@ LEAST_COUNT = 2.5  # fixes, faded, before anything is believed
 ENOUGH_COUNT = 10.0  # and before residuals may say that the receiver states too much
 MARGIN = 6.0  # and so many times more than they show is believed of its errors
 LEAST_FIT = 0.05  # but never less than this, of what the weights expect
+MOVING = 1.0  # a fix faster than this is of no carrier at rest [m/s]
 MOST_RESTS = 20.0  # blocks over which the bias is averaged
 
 
 @kernel
 def learn_bias(x: Vec) -> None:
-    """Average the gyro's reading at rest into the bias."""
+    """Average the gyro's reading at rest into the bias.
+
+    A car on a smooth road, straight or in one long turn, is as quiet; the last fix tells.
+    """
+    if x[A_FIX] > 0.0 and x[A_V] * x[A_V] + x[A_V + 1] * x[A_V + 1] > MOVING * MOVING:
+        return
     k = 1.0 / (1.0 + min(x[A_REST], MOST_RESTS))
     x[A_REST] += 1.0
     for i in range(3):

@@ -143,6 +143,8 @@ from strapdown.kernels.quat import exp, mul
 W_SIZE = TAPE
 
 SD_TILT_START = 0.02  # of level after alignment [rad]
+SD_TILT_UNRESTED = 0.05  # of level, where no rest has shown the gyro's bias [rad]
+SD_HEADING_UNRESTED = 0.7  # of heading there, besides what its own curvature says [rad]
 SD_REST_BIAS = 5e-4  # of a gyro bias that was seen at rest [rad/s]
 TURN_IN_GAP = 0.3  # angular rate about down that a gap may hide [rad/s]
 TILT_IN_GAP = 0.03  # [rad/s]
@@ -178,6 +180,10 @@ def start(x: Vec, P: Mat, p: Vec, w: Vec) -> None:
         P[DBG + i, DBG + i] = SD_REST_BIAS * SD_REST_BIAS if known else p[SD_BG] * p[SD_BG]
         P[DBA + i, DBA + i] = p[SD_BA] * p[SD_BA]
     P[PHI + 2, PHI + 2] = 2.0 * x[A_VAR] + 0.001
+    if not known:  # the gyroscope's bias has turned gravity into what looked like acceleration
+        for i in range(2):
+            P[PHI + i, PHI + i] = SD_TILT_UNRESTED * SD_TILT_UNRESTED
+        P[PHI + 2, PHI + 2] += SD_HEADING_UNRESTED * SD_HEADING_UNRESTED
     prior(P, p, w, int(p[I_SG]), 3, p[SD_SCALE_G])
     prior(P, p, w, int(p[I_SA]), 3, p[SD_SCALE_A])
     prior(P, p, w, int(p[I_ARM_A]), 3, p[SD_ARM_A])
@@ -199,7 +205,7 @@ def start(x: Vec, P: Mat, p: Vec, w: Vec) -> None:
     x[MODE] = 1.0
     x[ALIGNED] = FULL
     if x[MOUNTED] > 0.0:
-        new_mount(x, P, p, w, P[PHI + 2, PHI + 2])
+        new_mount(x, P, p, w)
     earth_terms(x)
     if w[RECORD] > 0.0:
         at = int(w[NEXT])

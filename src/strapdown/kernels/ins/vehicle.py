@@ -40,6 +40,7 @@ from strapdown.kernels.ins.layout import (
     PHI,
     QVB,
     RATE,
+    S3,
     SD_ARM_V,
     SD_BARO,
     SD_MOUNT,
@@ -61,6 +62,7 @@ from strapdown.kernels.memory import SPEED as IN_SPEED
 from strapdown.kernels.memory import T
 from strapdown.kernels.quat import dcm, from_dcm, mul, rotate, rotate_inverse
 
+MOUNT_UNKNOWN = 3.0  # prior of a mount that nothing is known of [rad]
 SEARCH_SPEED = 2.5  # the mount is looked for above this speed [m/s]
 SEARCH_RATE = 0.12  # and below this angular rate [rad/s]
 SEARCH_HEADING = 0.15  # and with heading known to this [rad]
@@ -230,18 +232,44 @@ def find_mount(x: Vec, P: Mat, p: Vec, w: Vec, dt: float) -> None:
     x[QVB], x[QVB + 1], x[QVB + 2], x[QVB + 3] = qw, qa, qb, qc
     x[MOUNTED] = 1.0
     x[M_BACK] = 0.0
-    new_mount(x, P, p, w, heading)
+    new_mount(x, P, p, w)
+    tie_mount(x, P, p, w)
 
 
 @kernel
-def new_mount(x: Vec, P: Mat, p: Vec, w: Vec, heading: float) -> None:
-    """Prior of a mount that was found with heading of variance `heading` [rad^2]."""
+def new_mount(x: Vec, P: Mat, p: Vec, w: Vec) -> None:
+    """Prior of a mount that is known besides the attitude."""
     x[ARM_V] = p[ARM_V_0]
-    k = int(p[I_MOUNT])
-    reset(P, p, w, k, 3, p[SD_MOUNT])
-    if k > 0:
-        P[k + 2, k + 2] += heading
+    reset(P, p, w, int(p[I_MOUNT]), 3, p[SD_MOUNT])
     reset(P, p, w, int(p[I_ARM_V]), 1, p[SD_ARM_V])
+
+
+@kernel
+def tie_mount(x: Vec, P: Mat, p: Vec, w: Vec) -> None:
+    """Prior of a mount that was found by the attitude: it is off by what the attitude is off.
+
+    The vehicle's axes came from the course, so that ``mu_v = C_vn phi_n`` and an error of its own.
+    Taken for independent, the constraint would turn an error of heading into knowledge.
+    """
+    k = int(p[I_MOUNT])
+    if k < 0:
+        return
+    reset(P, p, w, k, 3, MOUNT_UNKNOWN)
+    qw, qa, qb, qc = mul(
+        x[QVB], x[QVB + 1], x[QVB + 2], x[QVB + 3], x[Q], -x[Q + 1], -x[Q + 2], -x[Q + 3]
+    )
+    c0, c1, c2, c3, c4, c5, c6, c7, c8 = dcm(qw, qa, qb, qc)
+    w[S3], w[S3 + 1], w[S3 + 2] = c0, c1, c2
+    w[S3 + 3], w[S3 + 4], w[S3 + 5] = c3, c4, c5
+    w[S3 + 6], w[S3 + 7], w[S3 + 8] = c6, c7, c8
+    clear_correction(p, w)
+    for i in range(3):
+        clear_row(p, w)
+        w[H + k + i] = 1.0
+        for j in range(3):
+            w[H + PHI + j] = -w[S3 + 3 * i + j]
+        project(P, p, w)
+        absorb(P, p, w, 0.0, p[SD_MOUNT] * p[SD_MOUNT])
 
 
 @kernel
@@ -256,7 +284,8 @@ def turn_mount(x: Vec, P: Mat, p: Vec, w: Vec, dt: float) -> None:
         qw, qa, qb, qc = mul(0.0, 0.0, 0.0, 1.0, x[QVB], x[QVB + 1], x[QVB + 2], x[QVB + 3])
         x[QVB], x[QVB + 1], x[QVB + 2], x[QVB + 3] = qw, qa, qb, qc
         x[M_BACK] = 0.0
-        new_mount(x, P, p, w, P[PHI + 2, PHI + 2])
+        new_mount(x, P, p, w)
+        tie_mount(x, P, p, w)
 
 
 @kernel

@@ -4,14 +4,14 @@ For each: `*_middle` writes the turn of the frame and the change of velocity by 
 Coriolis for the middle of the step, to which it goes with the first half of the specific force
 and the terms of the step before; `*_move` advances the position with the mean velocity.
 
-==========  ===========================================  ================================
-Frame       velocity                                     position
-==========  ===========================================  ================================
-inertial    ``v_i' = f + g + omega_ie x (omega_ie x r)``  ``r_i' = v_i``
-ECEF        ``v_e' = f - 2 omega_ie x v + g``            ``r_e' = v_e``
-NED         ``v_n' = f - (2 omega_ie + omega_en) x v + g``  latitude, longitude, height
-wander      ``v_w' = f - (2 omega_ie + omega_ew) x v + g``  ``q_ew``, height
-==========  ===========================================  ================================
+========  ==============================================  ===========================
+Frame     velocity                                        position
+========  ==============================================  ===========================
+inertial  ``v_i' = f + g + omega_ie x (omega_ie x r)``    ``r_i' = v_i``
+ECEF      ``v_e' = f - 2 omega_ie x v + g``               ``r_e' = v_e``
+NED       ``v_n' = f - (2 omega_ie + omega_en) x v + g``  latitude, longitude, height
+wander    ``v_w' = f - (2 omega_ie + omega_ew) x v + g``  ``q_ew``, height
+========  ==============================================  ===========================
 
 The inertial one is (2.5.9) of [1]_ with ``v_i = v + omega_ie x r`` in place of the velocity over
 ground, which leaves Newton's law.

@@ -3,17 +3,17 @@
 All functions are pure: a recording and a span in, an `Alignment` out. Those for rest refuse a
 span in which the box moves, those for motion one whose geometry leaves the heading open.
 
-================== ========================= ===========================================
-Function           Needs                     Heading from
-================== ========================= ===========================================
-`level`            rest                      what is given
-`magnetic`         rest, magnetometer        the field
-`gyrocompass`      rest, a good gyroscope    the Earth's rate, after levelling
-`analytic`         rest, a good gyroscope    gravity and Earth's rate at once (TRIAD)
-`course`           straight drive, GNSS      the direction of travel; mount known
-`velocity_matching` motion, GNSS             accelerations; any mount
-`mount`            motion, GNSS              gives the mount itself: box in the vehicle
-================== ========================= ===========================================
+===================  ======================  ==========================================
+Function             Needs                   Heading from
+===================  ======================  ==========================================
+`level`              rest                    what is given
+`magnetic`           rest, magnetometer      the field
+`gyrocompass`        rest, a good gyroscope  the Earth's rate, after levelling
+`analytic`           rest, a good gyroscope  gravity and Earth's rate at once (TRIAD)
+`course`             straight drive, GNSS    the direction of travel; mount known
+`velocity_matching`  motion, GNSS            accelerations; any mount
+`mount`              motion, GNSS            gives the mount itself: box in the vehicle
+===================  ======================  ==========================================
 """
 
 from strapdown.navigation.alignment.at_rest import (

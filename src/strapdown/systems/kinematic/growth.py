@@ -68,7 +68,7 @@ def _integrals(x: FloatArray, times: int) -> FloatArray:
 
 
 def slope(t: FloatArray, y: FloatArray) -> float:
-    """Return the slope of |y| over t in log-log axes, from `FIRST` to `LAST`."""
+    """Return the slope of the size of y over t in log-log axes, from `FIRST` to `LAST`."""
     return power(t, y, FIRST, LAST)
 
 

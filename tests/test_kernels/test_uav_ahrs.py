@@ -24,12 +24,28 @@ from truth.sphere import (
 
 from strapdown.attitude import MultiModeAhrs, StandardAhrs
 from strapdown.kernels import memory as m
+from strapdown.kernels import multi_mode_ahrs
 from strapdown.kernels import status as s
 from strapdown.kernels import uav_ahrs as k
 from strapdown.systems.uav import programs
 
 sympy = pytest.importorskip("sympy")
 FILTERS = [StandardAhrs, MultiModeAhrs]
+
+
+def test_measurement_surer_than_round_off_leaves_a_covariance():
+    """Variance 1e-25 beside a P of 10: the update's rounding is far larger than what is left."""
+    rng = np.random.default_rng(5)
+    root = rng.standard_normal((7, 7))
+    P, w = 10.0 * (root @ root.T + 0.1 * np.eye(7)), np.zeros(multi_mode_ahrs.W_SIZE)
+    for h in rng.standard_normal((200, 4)):
+        w[k.W_H : k.W_H + 4] = h
+        left, expected, accepted = k.update_scalar(P, w, 0.1, 1e-25, np.inf)
+        assert accepted
+        assert expected >= 0.0
+        assert np.isfinite(left)
+        assert np.all(np.diag(P) > 0.0)
+    assert np.isfinite(w).all()
 
 
 def test_tangent_is_what_a_small_turn_makes_of_the_quaternion():

@@ -11,6 +11,7 @@ from math import pi, sqrt
 
 from strapdown.kernels import status as s
 from strapdown.kernels._jit import Mat, Vec, kernel
+from strapdown.kernels.mekf import ROUND_OFF
 from strapdown.kernels.memory import (
     ALIGNED,
     BG,
@@ -185,7 +186,8 @@ def update_scalar(
         w[W_PH + i] = P[i, 0] * h0 + P[i, 1] * h1 + P[i, 2] * h2 + P[i, 3] * h3
     hph = h0 * w[W_PH] + h1 * w[W_PH + 1] + h2 * w[W_PH + 2] + h3 * w[W_PH + 3]
     left = innovation - h0 * w[W_DX] - h1 * w[W_DX + 1] - h2 * w[W_DX + 2] - h3 * w[W_DX + 3]
-    expected = hph + r
+    hph = max(hph, 0.0)
+    expected = hph + max(r, ROUND_OFF * hph)
     variance = expected
     accepted = left * left <= gate * gate * expected
     if not accepted:
